@@ -1,0 +1,4 @@
+//! One elastic rod as an FMI 2.0 co-simulation unit.
+#![deny(unsafe_code)]
+
+pub mod unit;
