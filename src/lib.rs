@@ -1,4 +1,13 @@
 //! One elastic rod as an FMI 2.0 co-simulation unit.
 #![deny(unsafe_code)]
 
+pub mod so3;
+pub mod mesh;
+pub mod rod;
+pub mod sweep;
+pub mod alpha;
+pub mod pose;
+pub mod energy;
+pub mod stepper;
+pub mod modes;
 pub mod unit;

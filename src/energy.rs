@@ -1,0 +1,93 @@
+//! Energies of a state, and the works and losses of a step; all by the Gauss rule of the cells.
+
+use crate::mesh::Mesh;
+use crate::pose::{Boundary, State};
+use crate::rod::Rod;
+use crate::so3;
+use nalgebra::Vector3;
+
+/// Energies, and works since the start, J. kinetic + elastic + gravity + dissipated grows by work_base + work_tip, up to the
+/// second order of the time scheme.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of the rod and the body at its tip.
+    pub kinetic: f64,
+    /// Stored in bending, twist and, if extensible, shear and stretch.
+    pub elastic: f64,
+    /// Potential of gravity, zero at the world origin.
+    pub gravity: f64,
+    /// Lost in Kelvin-Voigt damping and drag.
+    pub dissipated: f64,
+    /// Work the base has done on the rod.
+    pub work_base: f64,
+    /// Work the tip force and moment have done on the rod.
+    pub work_tip: f64,
+}
+
+impl Energy {
+    /// Energies of a state at the start, where no work has been done.
+    pub fn of(mesh: &Mesh, rod: &Rod, state: &State, gravity: &Vector3<f64>) -> Self {
+        let mut energy = Self::default();
+        let stages = mesh.rule.stages;
+        for (i, section) in state.points.iter().enumerate() {
+            let cell = &mesh.cells[i / stages];
+            let weight = cell.length * mesh.rule.b[i % stages];
+            let memory = &state.memory[i];
+            let (u, omega) = (memory.travel.velocity.value, memory.spin.velocity.value);
+            let strain = memory.kappa - cell.kappa_rest;
+            let force = section.rotation.tr_mul(&section.force);
+            energy.kinetic += 0.5
+                * weight
+                * (rod.mass_per_length * u.norm_squared() + omega.dot(&rod.inertia_per_length.component_mul(&omega)));
+            energy.elastic += 0.5
+                * weight
+                * (strain.dot(&rod.stiffness.component_mul(&strain))
+                    + force.dot(&rod.compliance.component_mul(&force)));
+            energy.gravity -= weight * rod.mass_per_length * gravity.dot(&section.position);
+        }
+        let memory = state.tip_memory();
+        let (u, omega) = (memory.travel.velocity.value, memory.spin.velocity.value);
+        energy.kinetic += 0.5 * (rod.tip_mass * u.norm_squared() + rod.tip_inertia * omega.norm_squared());
+        energy.gravity -= rod.tip_mass * gravity.dot(&state.tip().position);
+        energy
+    }
+
+    /// Energies after a step from `old` to `new`, with the works and losses of the step added.
+    pub fn after(&self, mesh: &Mesh, rod: &Rod, old: &State, new: &State, boundary: &Boundary) -> Self {
+        let turn = |from: &nalgebra::Matrix3<f64>, to: &nalgebra::Matrix3<f64>| so3::log(&(to * from.transpose()));
+        let (base_old, base_new) = (&old.nodes[0], &new.nodes[0]);
+        let base = -0.5 * (base_old.force + base_new.force).dot(&(base_new.position - base_old.position))
+            - 0.5 * (base_old.moment + base_new.moment).dot(&turn(&base_old.rotation, &base_new.rotation));
+        let tip = boundary.tip_force.dot(&(new.tip().position - old.tip().position))
+            + boundary.tip_moment.dot(&turn(&old.tip().rotation, &new.tip().rotation));
+        let lost = 0.5 * new.dt * (losses(mesh, rod, old) + losses(mesh, rod, new));
+        Self {
+            dissipated: self.dissipated + lost,
+            work_base: self.work_base + base,
+            work_tip: self.work_tip + tip,
+            ..Self::of(mesh, rod, new, &boundary.gravity)
+        }
+    }
+
+    /// kinetic + elastic + gravity.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.elastic + self.gravity
+    }
+
+    /// What the balance misses: zero but for the error of the time scheme, and its numerical damping.
+    pub fn residual(&self, start: &Self) -> f64 {
+        self.total() + self.dissipated - start.total() - self.work_base - self.work_tip
+    }
+}
+
+/// Power lost in damping and drag, W.
+fn losses(mesh: &Mesh, rod: &Rod, state: &State) -> f64 {
+    let stages = mesh.rule.stages;
+    let viscosity = rod.stiffness.component_mul(&rod.damping);
+    let at = |i: usize| {
+        let memory = &state.memory[i];
+        let (strain, u) = (memory.strain.velocity.value, memory.travel.velocity.value);
+        strain.dot(&viscosity.component_mul(&strain)) + rod.drag * u.norm_squared()
+    };
+    (0..mesh.points()).map(|i| at(i) * mesh.cells[i / stages].length * mesh.rule.b[i % stages]).sum()
+}

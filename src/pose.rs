@@ -1,0 +1,846 @@
+//! The pose formulation: r, R, n, m and the acceleration a in the world frame, collocated at the Gauss points of every cell.
+//!
+//! ```text
+//! r_s = R (e₃ + C Rᵀn)          R_s = R κ̂,  κ = κ̂₀ + K⁻¹ Rᵀm          (eqs 1, 11; C = 0: eq 8)
+//! n_s = ρA a − f                                                      (eq 5)
+//! m_s = R (ρI ω_t + ω × ρI ω) − r_s × n                               (eq 6)
+//! a_s = R (ω × (ω × e₃) + ω_t × e₃)                                   (the second time derivative of eq 8)
+//! ```
+//!
+//! ω and ω_t at a Gauss point follow from its new rotation and its history through the time scheme. All of r or a, R, n and m
+//! are iterated ('lifted'), so that Newton sees the equations as they stand here and not their composition.
+//!
+//! The acceleration has two rows. [`Row::Rotations`] is the one above: the section rotations are then the only variables with a
+//! history and the rod is an ordinary differential equation. [`Row::Positions`] takes a from the history of r instead; it is the
+//! row of the extensible rod, and for the inextensible one the more forgiving of the two at steps that do not resolve the motion.
+
+// one-letter names are the paper's: R, I, J, W are matrices
+#![allow(non_snake_case)]
+
+use crate::alpha::{Motion, Rate, Scheme};
+use crate::mesh::{Gauss, MAX_STAGES, Mesh};
+use crate::rod::Rod;
+use crate::so3;
+use crate::sweep::{CellEnds, Increment, Point, Relation, Sweep, System};
+use nalgebra::{Matrix3, Vector3};
+
+type Vec3 = Vector3<f64>;
+type Mat3 = Matrix3<f64>;
+
+/// The unknowns at a node or Gauss point, world frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// r, m.
+    pub position: Vec3,
+    /// R.
+    pub rotation: Mat3,
+    /// n, N: what the part s⁺ exerts on the part s⁻.
+    pub force: Vec3,
+    /// m, N·m.
+    pub moment: Vec3,
+    /// a + ν u with the drag per mass ν, m/s²: what the distributed force balances.
+    pub acceleration: Vec3,
+}
+
+impl Default for Section {
+    fn default() -> Self {
+        let zero = Vec3::zeros();
+        Self { position: zero, rotation: Mat3::identity(), force: zero, moment: zero, acceleration: zero }
+    }
+}
+
+/// What a Gauss point (or the tip) remembers between steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// ω, ω_t, body frame.
+    pub spin: Motion,
+    /// u, a, world frame.
+    pub travel: Motion,
+    /// κ, body frame, 1/m.
+    pub kappa: Vec3,
+    /// κ_t, κ_tt, body frame.
+    pub strain: Motion,
+}
+
+/// Motion of the base at one instant, world frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Base {
+    /// r(0), m.
+    pub position: Vec3,
+    /// R(0).
+    pub rotation: Mat3,
+    /// u(0), m/s.
+    pub velocity: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular_velocity: Vec3,
+    /// a(0), m/s².
+    pub acceleration: Vec3,
+}
+
+impl Base {
+    /// A base at rest.
+    pub fn at_rest(position: Vec3, rotation: Mat3) -> Self {
+        let zero = Vec3::zeros();
+        Self { position, rotation, velocity: zero, angular_velocity: zero, acceleration: zero }
+    }
+}
+
+/// What acts on the rod at one instant, world frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Boundary {
+    /// Motion of the base.
+    pub base: Base,
+    /// Dead force on the tip, N.
+    pub tip_force: Vec3,
+    /// Dead moment on the tip, N·m.
+    pub tip_moment: Vec3,
+    /// g, m/s².
+    pub gravity: Vec3,
+}
+
+/// A rod at one instant, with its history.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// At the N+1 nodes.
+    pub nodes: Vec<Section>,
+    /// At the Gauss points, cell by cell.
+    pub points: Vec<Section>,
+    /// Histories of the Gauss points, then of the tip.
+    pub memory: Vec<Memory>,
+    /// Motion of the base.
+    pub base: Base,
+    /// Length of the step that led here, s; 0 at a start.
+    pub dt: f64,
+}
+
+/// Where the acceleration of the centreline comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Row {
+    /// a_s = (d₃)_tt: from the section rotations.
+    Rotations,
+    /// From the history of r.
+    Positions,
+}
+
+/// How the new instant hangs on the old one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Time {
+    /// No inertia, no damping: the static rod.
+    Static,
+    /// A step of `dt` s.
+    Step {
+        /// The time scheme.
+        scheme: Scheme,
+        /// Δt, s.
+        dt: f64,
+        /// The acceleration row.
+        row: Row,
+    },
+}
+
+impl Time {
+    /// ∂v/∂x and ∂a/∂x.
+    fn weights(&self) -> (f64, f64) {
+        match self {
+            Self::Static => (0.0, 0.0),
+            Self::Step { scheme, dt, .. } => {
+                let weight = scheme.rate_weight(*dt);
+                (weight, weight * weight)
+            }
+        }
+    }
+
+    fn row(&self) -> Row {
+        match self {
+            Self::Static => Row::Positions,
+            Self::Step { row, .. } => *row,
+        }
+    }
+
+    fn motion(&self, old: &Motion, increment: &Vec3) -> Motion {
+        match self {
+            Self::Static => Motion::default(),
+            Self::Step { scheme, dt, .. } => scheme.motion(old, increment, *dt),
+        }
+    }
+
+    /// κ_t = weight κ + offset.
+    fn strain_rate(&self, old: &Memory) -> (f64, Vec3) {
+        match self {
+            Self::Static => (0.0, Vec3::zeros()),
+            Self::Step { scheme, dt, .. } => {
+                let weight = scheme.rate_weight(*dt);
+                (weight, scheme.rate(&old.strain.velocity, &Vec3::zeros(), *dt).value - old.kappa * weight)
+            }
+        }
+    }
+}
+
+impl State {
+    /// The unstressed rod on a base, moving with it as one rigid body.
+    pub fn at_rest_shape(mesh: &Mesh, base: &Base) -> Self {
+        let stages = mesh.rule.stages;
+        let mut state = Self {
+            nodes: vec![Section::default(); mesh.cells.len() + 1],
+            points: vec![Section::default(); mesh.points()],
+            memory: vec![Memory::default(); mesh.points() + 1],
+            base: *base,
+            dt: 0.0,
+        };
+        state.nodes[0].rotation = base.rotation;
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let R_0 = state.nodes[j].rotation;
+            for k in 0..stages {
+                let point = j * stages + k;
+                state.points[point].rotation = R_0 * so3::exp(&(cell.kappa_rest * (cell.length * mesh.rule.c[k])));
+                state.memory[point].kappa = cell.kappa_rest;
+            }
+            state.nodes[j + 1].rotation = R_0 * so3::exp(&(cell.kappa_rest * cell.length));
+        }
+        state.rebuild_positions(mesh, &Rod { compliance: Vec3::zeros(), ..Rod::circular(1.0, 1.0, 1.0, 1.0) });
+        state.move_rigidly();
+        state
+    }
+
+    /// Sets the velocities of all sections to those of a rigid body that moves with the base; accelerations to zero.
+    pub fn move_rigidly(&mut self) {
+        let Base { position: r_0, velocity: u_0, angular_velocity: w, .. } = self.base;
+        let tip = self.nodes[self.nodes.len() - 1];
+        for (memory, section) in self.memory.iter_mut().zip(self.points.iter().chain(std::iter::once(&tip))) {
+            let zero = Vec3::zeros();
+            memory.spin = Motion::starting(section.rotation.tr_mul(&w), zero, zero);
+            memory.travel = Motion::starting(u_0 + w.cross(&(section.position - r_0)), zero, zero);
+            memory.strain = Motion::default();
+        }
+        self.dt = 0.0;
+    }
+
+    /// The section at the tip.
+    pub fn tip(&self) -> &Section {
+        &self.nodes[self.nodes.len() - 1]
+    }
+
+    /// The history of the tip.
+    pub fn tip_memory(&self) -> &Memory {
+        &self.memory[self.memory.len() - 1]
+    }
+
+    /// The centreline at the fraction θ of a cell, on its collocation polynomial.
+    pub fn position_within(&self, mesh: &Mesh, rod: &Rod, cell: usize, theta: f64) -> Vec3 {
+        let weights = mesh.rule.weights(theta);
+        let stages = mesh.rule.stages;
+        (0..stages).fold(self.nodes[cell].position, |r, l| {
+            r + tangent(rod, &self.points[cell * stages + l]) * (mesh.cells[cell].length * weights[l])
+        })
+    }
+
+    /// Integrates r_s along the rod from the base.
+    pub fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
+        self.nodes[0].position = self.base.position;
+        self.accumulate(mesh, |point, _| tangent(rod, point), |section| &mut section.position);
+    }
+
+    /// Integrates a_s along the rod from the base (the drag's ν u included).
+    fn rebuild_accelerations(&mut self, mesh: &Mesh, rod: &Rod) {
+        let drag = rod.drag_rate();
+        self.nodes[0].acceleration = self.base.acceleration + self.base.velocity * drag;
+        self.accumulate(
+            mesh,
+            |point, memory| point.rotation * acceleration_slope(&memory.spin, drag),
+            |section| &mut section.acceleration,
+        );
+    }
+
+    fn accumulate(
+        &mut self,
+        mesh: &Mesh,
+        slope: impl Fn(&Section, &Memory) -> Vec3,
+        field: impl Fn(&mut Section) -> &mut Vec3,
+    ) {
+        let Gauss { stages, a, b, .. } = &mesh.rule;
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let first = j * stages;
+            let start = *field(&mut self.nodes[j]);
+            let mut slopes = [Vec3::zeros(); MAX_STAGES];
+            for l in 0..*stages {
+                slopes[l] = slope(&self.points[first + l], &self.memory[first + l]);
+            }
+            for k in 0..*stages {
+                *field(&mut self.points[first + k]) = integral(start, cell.length, &a[k], &slopes, *stages);
+            }
+            *field(&mut self.nodes[j + 1]) = integral(start, cell.length, b, &slopes, *stages);
+        }
+    }
+
+    /// Copies without allocating.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.nodes.copy_from_slice(&other.nodes);
+        self.points.copy_from_slice(&other.points);
+        self.memory.copy_from_slice(&other.memory);
+        self.base = other.base;
+        self.dt = other.dt;
+    }
+
+    /// Applies μ times the increments of a sweep.
+    pub fn apply(&mut self, nodes: &[Increment], points: &[Increment], mu: f64, row: Row) {
+        let sections = self.nodes.iter_mut().zip(nodes).chain(self.points.iter_mut().zip(points));
+        for (section, delta) in sections {
+            section.rotation = so3::exp(&(delta.phi * mu)) * section.rotation;
+            section.force += delta.n * mu;
+            section.moment += delta.m * mu;
+            match row {
+                Row::Rotations => section.acceleration += delta.w * mu,
+                Row::Positions => section.position += delta.w * mu,
+            }
+        }
+    }
+
+    /// Takes the solution of [`assemble_accelerations`] as ω_t, a, n and m.
+    pub fn take_accelerations(&mut self, rod: &Rod, nodes: &[Increment], points: &[Increment]) {
+        let drag = rod.drag_rate();
+        for (section, solved) in self.nodes.iter_mut().zip(nodes).chain(self.points.iter_mut().zip(points)) {
+            section.acceleration = solved.w;
+            section.force = solved.n;
+            section.moment = solved.m;
+        }
+        let tip = &self.nodes[self.nodes.len() - 1];
+        for (memory, (section, solved)) in self
+            .memory
+            .iter_mut()
+            .zip(self.points.iter().zip(points).chain(std::iter::once((tip, &nodes[nodes.len() - 1]))))
+        {
+            let (spin, travel) = (&memory.spin.velocity.value, &memory.travel.velocity.value);
+            let zero = Vec3::zeros();
+            memory.spin = Motion::starting(*spin, section.rotation.tr_mul(&solved.phi), zero);
+            memory.travel = Motion::starting(*travel, solved.w - travel * drag, zero);
+        }
+    }
+
+    /// Takes the solution of [`assemble_jerks`] as ω_tt and a_t.
+    pub fn take_jerks(&mut self, rod: &Rod, nodes: &[Increment], points: &[Increment]) {
+        let drag = rod.drag_rate();
+        let tip = &self.nodes[self.nodes.len() - 1];
+        for (memory, (section, solved)) in self
+            .memory
+            .iter_mut()
+            .zip(self.points.iter().zip(points).chain(std::iter::once((tip, &nodes[nodes.len() - 1]))))
+        {
+            memory.spin.jerk = section.rotation.tr_mul(&solved.phi);
+            memory.travel.jerk = solved.w - memory.travel.acceleration.value * drag;
+        }
+    }
+
+    /// Makes a converged iterate a state: memories, and what the row in use did not need.
+    pub fn settle(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
+        self.base = boundary.base;
+        for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
+            section.rotation = so3::orthonormalised(&section.rotation);
+        }
+        let drag = rod.drag_rate();
+        let tip = self.nodes.len() - 1;
+        for (i, memory) in self.memory.iter_mut().enumerate() {
+            let (section, old_section) = match self.points.get(i) {
+                Some(section) => (section, &old.points[i]),
+                None => (&self.nodes[tip], &old.nodes[tip]),
+            };
+            let past = &old.memory[i];
+            let theta = so3::log(&old_section.rotation.tr_mul(&section.rotation));
+            memory.spin = time.motion(&past.spin, &theta);
+        }
+        for (i, section) in self.points.iter().enumerate() {
+            let cell = &mesh.cells[i / mesh.rule.stages];
+            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
+            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(section);
+            memory.strain = time.motion(&past.strain, &(memory.kappa - past.kappa));
+        }
+        self.rebuild_positions(mesh, rod);
+        match time {
+            Time::Static => self.move_rigidly(),
+            Time::Step { scheme, dt, row } => {
+                self.dt = *dt;
+                self.rebuild_accelerations(mesh, rod);
+                if *row == Row::Rotations {
+                    self.rebuild_velocities(mesh);
+                }
+                for (i, memory) in self.memory.iter_mut().enumerate() {
+                    let (section, old_section) = match self.points.get(i) {
+                        Some(section) => (section, &old.points[i]),
+                        None => (&self.nodes[tip], &old.nodes[tip]),
+                    };
+                    let past = &old.memory[i].travel;
+                    let increment = section.position - old_section.position;
+                    memory.travel = match row {
+                        Row::Positions => scheme.motion(past, &increment, *dt),
+                        Row::Rotations => {
+                            let u = memory.travel.velocity.value;
+                            scheme.followed(past, &increment, u, section.acceleration - u * drag, *dt)
+                        }
+                    };
+                }
+            }
+        }
+    }
+
+    /// Integrates u_s = R (ω × e₃) along the rod from the base.
+    fn rebuild_velocities(&mut self, mesh: &Mesh) {
+        let Gauss { stages, a, b, .. } = &mesh.rule;
+        let mut start = self.base.velocity;
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let first = j * stages;
+            let mut slopes = [Vec3::zeros(); MAX_STAGES];
+            for l in 0..*stages {
+                let omega = self.memory[first + l].spin.velocity.value;
+                slopes[l] = self.points[first + l].rotation * omega.cross(&Vec3::z());
+            }
+            for k in 0..*stages {
+                self.memory[first + k].travel.velocity.value = integral(start, cell.length, &a[k], &slopes, *stages);
+            }
+            start = integral(start, cell.length, b, &slopes, *stages);
+        }
+        if let Some(tip) = self.memory.last_mut() {
+            tip.travel.velocity.value = start;
+        }
+    }
+}
+
+#[inline]
+fn integral(start: Vec3, h: f64, weights: &[f64; MAX_STAGES], slopes: &[Vec3; MAX_STAGES], stages: usize) -> Vec3 {
+    (0..stages).fold(start, |sum, l| sum + slopes[l] * (h * weights[l]))
+}
+
+/// r_s.
+#[inline]
+fn tangent(rod: &Rod, section: &Section) -> Vec3 {
+    let R = &section.rotation;
+    if rod.is_extensible() {
+        R * (Vec3::z() + rod.compliance.component_mul(&R.tr_mul(&section.force)))
+    } else {
+        R.column(2).into_owned()
+    }
+}
+
+/// Rᵀ (a + ν u)_s = ω × (ω × e₃) + ω_t × e₃ + ν ω × e₃.
+#[inline]
+fn acceleration_slope(spin: &Motion, drag: f64) -> Vec3 {
+    let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
+    let along = omega.cross(&Vec3::z());
+    omega.cross(&along) + omega_t.cross(&Vec3::z()) + along * drag
+}
+
+/// The law of bending and twist at a point, with the strain rate expressed by the strain:
+/// Rᵀm = K_eff (κ − κ_eff), K_eff = K (1 + τ ∂κ_t/∂κ).
+struct Law {
+    stiffness: Vec3,
+    kappa_free: Vec3,
+}
+
+impl Law {
+    #[inline]
+    fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
+        let (weight, offset) = time.strain_rate(old);
+        let factor = rod.damping.map(|tau| 1.0 + tau * weight);
+        let free = kappa_rest - rod.damping.component_mul(&offset);
+        Self { stiffness: rod.stiffness.component_mul(&factor), kappa_free: free.component_div(&factor) }
+    }
+
+    #[inline]
+    fn kappa(&self, section: &Section) -> Vec3 {
+        self.kappa_free + section.rotation.tr_mul(&section.moment).component_div(&self.stiffness)
+    }
+}
+
+/// Sizes that make residuals and increments numbers of order one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// Of w, m or m/s².
+    pub w: f64,
+    /// Of n, N.
+    pub force: f64,
+    /// Of m, N·m.
+    pub moment: f64,
+}
+
+/// Residuals and blocks of all cells at an iterate. Returns the largest scaled residual.
+pub fn assemble(
+    mesh: &Mesh,
+    rod: &Rod,
+    old: &State,
+    state: &State,
+    boundary: &Boundary,
+    time: &Time,
+    scales: &Scales,
+    system: &mut System,
+) -> f64 {
+    let Gauss { stages, a, b, .. } = &mesh.rule;
+    let stages = *stages;
+    let (weight_v, weight_a) = time.weights();
+    let drag = rod.drag_rate();
+    let row = time.row();
+    let (rho_a, gravity) = (rod.mass_per_length, boundary.gravity);
+    let rho_i = rod.inertia_per_length;
+    let e_3 = Vec3::z();
+    let mut largest = 0.0f64;
+
+    system.mass = match row {
+        Row::Rotations => rho_a,
+        Row::Positions => rho_a * (weight_a + drag * weight_v),
+    };
+    let accumulated = |section: &Section| match row {
+        Row::Rotations => section.acceleration,
+        Row::Positions => section.position,
+    };
+
+    for (j, cell) in mesh.cells.iter().enumerate() {
+        let h = cell.length;
+        let (node_0, node_1) = (&state.nodes[j], &state.nodes[j + 1]);
+        let first = j * stages;
+        let mut log = [Vec3::zeros(); MAX_STAGES];
+        let mut g = [Vec3::zeros(); MAX_STAGES];
+        let mut w_s = [Vec3::zeros(); MAX_STAGES];
+        let mut n_s = [Vec3::zeros(); MAX_STAGES];
+        let mut m_s = [Vec3::zeros(); MAX_STAGES];
+
+        for k in 0..stages {
+            let section = &state.points[first + k];
+            let past = &old.memory[first + k];
+            let Section { rotation: R, force: n, moment: m, .. } = section;
+            let point: &mut Point = &mut system.points[first + k];
+
+            // R_s = R κ̂ as Φ_s = J_r⁻¹(Φ) κ, and the law
+            let law = Law::new(rod, &cell.kappa_rest, time, past);
+            let phi = so3::log(&node_0.rotation.tr_mul(R));
+            let (phi_s, phi_s_phi) = so3::rate_of_log(&phi, &law.kappa(section));
+            let J = so3::right_jacobian(&phi);
+            (log[k], g[k]) = (phi, phi_s);
+            point.spin = R * J;
+            point.law_strain = R * Mat3::from_diagonal(&law.stiffness) * J;
+            point.law_log = -(point.law_strain * phi_s_phi);
+            point.law_phi = -so3::hat(m);
+            point.e_law = Vec3::zeros();
+
+            // ω and ω_t from the history, with δω = weight_v W φ, δω_t = weight_a W φ
+            let (spin, W) = match time {
+                Time::Static => (Motion::default(), Mat3::zeros()),
+                Time::Step { .. } => {
+                    let theta = so3::log(&old.points[first + k].rotation.tr_mul(R));
+                    (time.motion(&past.spin, &theta), so3::inverse_right_jacobian(&theta) * R.transpose())
+                }
+            };
+            let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
+
+            // r_s
+            let r_s = tangent(rod, section);
+            let mut r_s_phi = -so3::hat(&r_s);
+            point.w_n = Mat3::zeros();
+            if system.extensible {
+                point.w_n = R * Mat3::from_diagonal(&rod.compliance) * R.transpose();
+                r_s_phi += point.w_n * so3::hat(n);
+            }
+
+            // a, or its slope
+            let distributed = match row {
+                Row::Rotations => {
+                    let slope = acceleration_slope(&spin, drag);
+                    let mut by_omega = omega * e_3.transpose() - e_3 * omega.transpose() * 2.0;
+                    by_omega += Mat3::from_diagonal_element(omega.z) - so3::hat(&e_3) * drag;
+                    w_s[k] = R * slope;
+                    let by_theta = by_omega * weight_v - so3::hat(&e_3) * weight_a;
+                    point.w_phi = R * by_theta * W - so3::hat(&w_s[k]);
+                    section.acceleration
+                }
+                Row::Positions => {
+                    w_s[k] = r_s;
+                    point.w_phi = r_s_phi;
+                    let travel = time.motion(&past.travel, &(section.position - old.points[first + k].position));
+                    travel.acceleration.value + travel.velocity.value * drag
+                }
+            };
+
+            // eq 5 and eq 6
+            n_s[k] = (distributed - gravity) * rho_a;
+            let spin_momentum = rho_i.component_mul(&omega);
+            let rotary = R * (rho_i.component_mul(&omega_t) + omega.cross(&spin_momentum));
+            let by_omega = so3::hat(&omega) * Mat3::from_diagonal(&rho_i) - so3::hat(&spin_momentum);
+            let by_theta = by_omega * weight_v + Mat3::from_diagonal(&(rho_i * weight_a));
+            m_s[k] = rotary - r_s.cross(n);
+            point.m_phi = R * by_theta * W - so3::hat(&rotary) + so3::hat(n) * r_s_phi;
+            point.m_n = so3::hat(n) * point.w_n - so3::hat(&r_s);
+        }
+
+        let w_0 = accumulated(node_0);
+        for k in 0..stages {
+            let section = &state.points[first + k];
+            let point = &mut system.points[first + k];
+            point.e_log = log[k] - integral(Vec3::zeros(), h, &a[k], &g, stages);
+            point.e_w = accumulated(section) - integral(w_0, h, &a[k], &w_s, stages);
+            let mut rest = [0.0; MAX_STAGES];
+            for l in 0..stages {
+                rest[l] = a[k][l] - b[l];
+            }
+            point.e_n = section.force - integral(node_1.force, h, &rest, &n_s, stages);
+            point.e_m = section.moment - integral(node_1.moment, h, &rest, &m_s, stages);
+            largest = largest
+                .max(point.e_log.amax())
+                .max(point.e_w.amax() / scales.w)
+                .max(point.e_n.amax() / scales.force)
+                .max(point.e_m.amax() / scales.moment);
+        }
+        let log_1 = so3::log(&node_0.rotation.tr_mul(&node_1.rotation));
+        let ends: &mut CellEnds = &mut system.cells[j];
+        ends.length = h;
+        ends.spin = node_1.rotation * so3::right_jacobian(&log_1);
+        ends.e_log = log_1 - integral(Vec3::zeros(), h, b, &g, stages);
+        ends.e_w = accumulated(node_1) - integral(w_0, h, b, &w_s, stages);
+        ends.e_n = node_0.force - integral(node_1.force, -h, b, &n_s, stages);
+        ends.e_m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
+        largest = largest
+            .max(ends.e_log.amax())
+            .max(ends.e_w.amax() / scales.w)
+            .max(ends.e_n.amax() / scales.force)
+            .max(ends.e_m.amax() / scales.moment);
+    }
+
+    // the base is where its path says
+    let Base { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
+    let target = match row {
+        Row::Rotations => a + u * drag,
+        Row::Positions => r,
+    };
+    system.base = (target - accumulated(&state.nodes[0]), so3::log(&(R * state.nodes[0].rotation.transpose())));
+
+    // the tip carries its loads and the body on it
+    let tip = state.tip();
+    let old_tip = old.tip();
+    let past = old.tip_memory();
+    system.tip = Default::default();
+    system.tip.n = boundary.tip_force - tip.force;
+    system.tip.m = boundary.tip_moment - tip.moment;
+    if rod.tip_mass > 0.0 {
+        let (a_tip, by_w) = match row {
+            Row::Rotations => (tip.acceleration - tip_velocity(mesh, old, state, boundary, time) * drag, 1.0),
+            Row::Positions => {
+                (time.motion(&past.travel, &(tip.position - old_tip.position)).acceleration.value, weight_a)
+            }
+        };
+        system.tip.n += (gravity - a_tip) * rod.tip_mass;
+        system.tip.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
+    }
+    if rod.tip_inertia > 0.0 {
+        if let Time::Step { .. } = time {
+            let theta = so3::log(&old_tip.rotation.tr_mul(&tip.rotation));
+            let R = tip.rotation;
+            let turning = R * time.motion(&past.spin, &theta).acceleration.value;
+            let W = so3::inverse_right_jacobian(&theta) * R.transpose();
+            system.tip.m -= turning * rod.tip_inertia;
+            system.tip.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
+        }
+    }
+    largest
+        .max(system.base.0.amax() / scales.w)
+        .max(system.base.1.amax())
+        .max(system.tip.n.amax() / scales.force)
+        .max(system.tip.m.amax() / scales.moment)
+}
+
+/// u at the tip of an iterate, only needed where a body sits on the tip of a rod with drag. Its derivative is left out of the
+/// Jacobian (it depends on every section): Newton's rate there is ν Δt instead of quadratic.
+fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, time: &Time) -> Vec3 {
+    let stages = mesh.rule.stages;
+    let mut u = boundary.base.velocity;
+    for (i, section) in state.points.iter().enumerate() {
+        let theta = so3::log(&old.points[i].rotation.tr_mul(&section.rotation));
+        let omega = time.motion(&old.memory[i].spin, &theta).velocity.value;
+        let weight = mesh.cells[i / stages].length * mesh.rule.b[i % stages];
+        u += section.rotation * omega.cross(&Vec3::z()) * weight;
+    }
+    u
+}
+
+/// The equations of motion at an instant as linear equations for the accelerations: φ stands for R ω_t, w for a + ν u; the
+/// moments at the points are those of the law. Sets these moments in `state`.
+pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundary: &Boundary, system: &mut System) {
+    let drag = rod.drag_rate();
+    let base = &boundary.base;
+    state.nodes[0].acceleration = base.acceleration + base.velocity * drag;
+    let stages = mesh.rule.stages;
+    for (i, section) in state.points.iter_mut().enumerate() {
+        let memory = &state.memory[i];
+        let strain =
+            memory.kappa - mesh.cells[i / stages].kappa_rest + rod.damping.component_mul(&memory.strain.velocity.value);
+        section.moment = section.rotation * rod.stiffness.component_mul(&strain);
+    }
+    let rates = |i: usize| {
+        let (R, spin) = (&state.points[i].rotation, &state.memory[i].spin);
+        let omega = spin.velocity.value;
+        let still = Motion { velocity: spin.velocity, ..Motion::default() };
+        Rates {
+            w_s: R * acceleration_slope(&still, drag),
+            n_s: -boundary.gravity * rod.mass_per_length,
+            m_s: R * omega.cross(&rod.inertia_per_length.component_mul(&omega)),
+            moment: state.points[i].moment,
+        }
+    };
+    let tip = Relation {
+        n: boundary.tip_force + (boundary.gravity + state.tip_memory().travel.velocity.value * drag) * rod.tip_mass,
+        m: boundary.tip_moment,
+        ..Relation::default()
+    };
+    assemble_rates(mesh, rod, state, state.nodes[0].acceleration, rates, tip, system);
+}
+
+/// The time derivative of those equations: φ stands for R ω_tt, w for the rate of a + ν u. `sweep` holds the accelerations.
+/// Sets κ_tt in `state`.
+pub fn assemble_jerks(mesh: &Mesh, rod: &Rod, state: &mut State, sweep: &Sweep, system: &mut System) {
+    let drag = rod.drag_rate();
+    let e_3 = Vec3::z();
+    for i in 0..state.points.len() {
+        state.memory[i].strain.acceleration = Rate::at_start(strain_acceleration(mesh, state, sweep, i));
+    }
+    let state = &*state;
+    let rates = |i: usize| {
+        let (section, spin) = (&state.points[i], &state.memory[i].spin);
+        let (R, omega, omega_t) = (&section.rotation, spin.velocity.value, spin.acceleration.value);
+        let slope = acceleration_slope(spin, drag);
+        let along = omega.cross(&e_3);
+        let slope_t = omega_t.cross(&along) + omega.cross(&omega_t.cross(&e_3)) + omega_t.cross(&e_3) * drag;
+        let (spun, spun_t) =
+            (rod.inertia_per_length.component_mul(&omega), rod.inertia_per_length.component_mul(&omega_t));
+        let rotary = spun_t + omega.cross(&spun);
+        let rotary_t = omega.cross(&rotary) + omega_t.cross(&spun) + omega.cross(&spun_t);
+        let memory = &state.memory[i];
+        let Motion { velocity: strain_t, acceleration: strain_tt, .. } = memory.strain;
+        let strain_t = strain_t.value + rod.damping.component_mul(&strain_tt.value);
+        Rates {
+            w_s: R * (omega.cross(&slope) + slope_t),
+            n_s: Vec3::zeros(),
+            m_s: R * rotary_t - (R * along).cross(&section.force),
+            moment: R * (omega.cross(&R.tr_mul(&section.moment)) + rod.stiffness.component_mul(&strain_t)),
+        }
+    };
+    let tip =
+        Relation { n: state.tip_memory().travel.acceleration.value * (drag * rod.tip_mass), ..Relation::default() };
+    assemble_rates(mesh, rod, state, state.base.acceleration * drag, rates, tip, system);
+}
+
+/// κ_tt at a point that so far moves rigidly, from the angular accelerations in `sweep`.
+fn strain_acceleration(mesh: &Mesh, state: &State, sweep: &Sweep, point: usize) -> Vec3 {
+    let stages = mesh.rule.stages;
+    let (j, k) = (point / stages, point % stages);
+    let R_0 = &state.nodes[j].rotation;
+    let log_tt = |i: usize| {
+        let R = &state.points[i].rotation;
+        let phi = so3::log(&R_0.tr_mul(R));
+        let turn = R.tr_mul(&(sweep.points[i].phi - sweep.nodes[j].phi));
+        (phi, so3::inverse_right_jacobian(&phi) * turn)
+    };
+    let phi_s_tt = (0..stages).fold(Vec3::zeros(), |sum, l| {
+        sum + log_tt(j * stages + l).1 * (mesh.rule.a_inverse[k][l] / mesh.cells[j].length)
+    });
+    let (phi, phi_tt) = log_tt(point);
+    let (_, derivative) = so3::rate_of_log(&phi, &state.memory[point].kappa);
+    so3::right_jacobian(&phi) * (phi_s_tt - derivative * phi_tt)
+}
+
+/// The known parts of a_s, n_s, m_s and m at a point in the equations for accelerations or their rates.
+struct Rates {
+    w_s: Vec3,
+    n_s: Vec3,
+    m_s: Vec3,
+    moment: Vec3,
+}
+
+/// The common linear operator: w_s = R (Rᵀφ × e₃) + …, n_s = ρA w + …, m_s = R ρI Rᵀφ − r_s × n + …, m given.
+fn assemble_rates(
+    mesh: &Mesh,
+    rod: &Rod,
+    state: &State,
+    base: Vec3,
+    rates: impl Fn(usize) -> Rates,
+    tip: Relation,
+    system: &mut System,
+) {
+    let stages = mesh.rule.stages;
+    let zero = [Vec3::zeros(); MAX_STAGES];
+    for j in 0..mesh.cells.len() {
+        let first = j * stages;
+        let (mut w_s, mut n_s, mut m_s) = (zero, zero, zero);
+        let mut moment = zero;
+        for k in 0..stages {
+            let R = &state.points[first + k].rotation;
+            let r_s = tangent(rod, &state.points[first + k]);
+            Rates { w_s: w_s[k], n_s: n_s[k], m_s: m_s[k], moment: moment[k] } = rates(first + k);
+            system.points[first + k] = Point {
+                spin: *R,
+                w_phi: -so3::hat(&r_s),
+                m_phi: R * Mat3::from_diagonal(&rod.inertia_per_length) * R.transpose(),
+                m_n: -so3::hat(&r_s),
+                ..Point::default()
+            };
+        }
+        set_loads(mesh, j, &w_s, &n_s, &m_s, system);
+        for k in 0..stages {
+            // the sweep solves for the whole moment, and the law says what it is
+            system.points[first + k].e_law = moment[k];
+        }
+        system.cells[j].spin = state.nodes[j + 1].rotation;
+    }
+    system.mass = rod.mass_per_length;
+    system.base = (base, Vec3::zeros());
+    system.tip = Relation {
+        n_w: Mat3::from_diagonal_element(-rod.tip_mass),
+        m_phi: Mat3::from_diagonal_element(-rod.tip_inertia),
+        ..tip
+    };
+}
+
+/// Residuals of a cell of a linear problem in which everything is zero but the given w_s, n_s and m_s.
+fn set_loads(
+    mesh: &Mesh,
+    j: usize,
+    w_s: &[Vec3; MAX_STAGES],
+    n_s: &[Vec3; MAX_STAGES],
+    m_s: &[Vec3; MAX_STAGES],
+    system: &mut System,
+) {
+    let Gauss { stages, a, b, .. } = &mesh.rule;
+    let h = mesh.cells[j].length;
+    let sum = |step: f64, weights: &[f64; MAX_STAGES], slopes| -integral(Vec3::zeros(), step, weights, slopes, *stages);
+    for k in 0..*stages {
+        let point = &mut system.points[j * stages + k];
+        let mut rest = [0.0; MAX_STAGES];
+        for l in 0..*stages {
+            rest[l] = a[k][l] - b[l];
+        }
+        point.e_log = Vec3::zeros();
+        point.e_w = sum(h, &a[k], w_s);
+        point.e_n = sum(h, &rest, n_s);
+        point.e_m = sum(h, &rest, m_s);
+    }
+    let ends = &mut system.cells[j];
+    ends.length = h;
+    ends.e_log = Vec3::zeros();
+    ends.e_w = sum(h, b, w_s);
+    ends.e_n = sum(-h, b, n_s);
+    ends.e_m = sum(-h, b, m_s);
+}
+
+/// Makes the residuals of `system` the inertia of the displacements `y` (position, rotation; of all points, then the tip)
+/// vibrating with ω = 1.
+pub fn load_with_inertia(mesh: &Mesh, rod: &Rod, state: &State, y: &[(Vec3, Vec3)], system: &mut System) {
+    let stages = mesh.rule.stages;
+    let zero = [Vec3::zeros(); MAX_STAGES];
+    for j in 0..mesh.cells.len() {
+        let (mut n_s, mut m_s) = (zero, zero);
+        for k in 0..stages {
+            let i = j * stages + k;
+            let R = &state.points[i].rotation;
+            n_s[k] = y[i].0 * -rod.mass_per_length;
+            m_s[k] = R * rod.inertia_per_length.component_mul(&R.tr_mul(&y[i].1)) * -1.0;
+        }
+        set_loads(mesh, j, &zero, &n_s, &m_s, system);
+    }
+    let (w, phi) = y[y.len() - 1];
+    system.base = Default::default();
+    system.tip.n = w * rod.tip_mass;
+    system.tip.m = phi * rod.tip_inertia;
+}

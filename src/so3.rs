@@ -1,0 +1,281 @@
+//! Rotations: hat, exp, log, and the tangent map of exp with its derivative.
+//!
+//! With R(Φ) = exp(Φ̂) and Φ a function of s, the body-frame rate κ = (Rᵀ R_s)^∨ and Φ_s are related by
+//!
+//! ```text
+//! Φ_s = J_r⁻¹(Φ) κ        J_r⁻¹(Φ) = 1 + Φ̂/2 + c(φ) Φ̂²        c = (1 − (φ/2) cot(φ/2)) / φ²
+//! κ   = J_r(Φ) Φ_s        J_r(Φ)   = 1 − b(φ) Φ̂ + d(φ) Φ̂²      b = (1 − cos φ)/φ²,  d = (φ − sin φ)/φ³
+//! ```
+//!
+//! (φ = |Φ|; J_r is the right Jacobian of SO(3)). All maps are smooth at Φ = 0 and use series there; J_r⁻¹ ends at φ = 2π,
+//! `log` returns |Φ| ≤ π.
+
+use nalgebra::{Matrix3, Vector3, Vector4};
+
+/// Below this φ² the coefficients come from their series: the closed forms lose digits by cancellation there.
+const SERIES: f64 = 0.25;
+
+/// The matrix v̂ with v̂ w = v × w.
+#[inline]
+pub fn hat(v: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+}
+
+/// Value of the power series Σ cₙ xⁿ.
+#[inline]
+fn series<const N: usize>(coefficients: [f64; N], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
+}
+
+/// sin φ / φ, (1 − cos φ)/φ², (φ − sin φ)/φ³ at φ².
+#[inline]
+fn exp_coefficients(phi2: f64) -> (f64, f64, f64) {
+    if phi2 < SERIES {
+        let a =
+            [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0, -1.0 / 39_916_800.0, 1.0 / 6_227_020_800.0];
+        let b = [
+            0.5,
+            -1.0 / 24.0,
+            1.0 / 720.0,
+            -1.0 / 40_320.0,
+            1.0 / 3_628_800.0,
+            -1.0 / 479_001_600.0,
+            1.0 / 87_178_291_200.0,
+        ];
+        let d = [
+            1.0 / 6.0,
+            -1.0 / 120.0,
+            1.0 / 5040.0,
+            -1.0 / 362_880.0,
+            1.0 / 39_916_800.0,
+            -1.0 / 6_227_020_800.0,
+            1.0 / 1_307_674_368_000.0,
+        ];
+        (series(a, phi2), series(b, phi2), series(d, phi2))
+    } else {
+        let phi = phi2.sqrt();
+        let (sin, cos) = phi.sin_cos();
+        (sin / phi, (1.0 - cos) / phi2, (phi - sin) / (phi2 * phi))
+    }
+}
+
+/// c(φ) and c'(φ)/φ at φ², from the Bernoulli numbers near 0.
+#[inline]
+fn inverse_coefficients(phi2: f64) -> (f64, f64) {
+    // c = Σ |B₂ₙ| φ²ⁿ⁻² / (2n)!, n ≥ 1
+    const C: [f64; 9] = [
+        1.0 / 12.0,
+        1.0 / 720.0,
+        1.0 / 30_240.0,
+        1.0 / 1_209_600.0,
+        1.0 / 47_900_160.0,
+        691.0 / 1_307_674_368_000.0,
+        1.0 / 74_724_249_600.0,
+        3617.0 / 10_670_622_842_880_000.0,
+        43_867.0 / 5_109_094_217_170_944_000.0,
+    ];
+    if phi2 < SERIES {
+        let c = series(C, phi2);
+        let mut derivative = [0.0; 8];
+        for (n, d) in derivative.iter_mut().enumerate() {
+            *d = 2.0 * (n + 1) as f64 * C[n + 1];
+        }
+        (c, series(derivative, phi2))
+    } else {
+        let phi = phi2.sqrt();
+        let (sin, cos) = (0.5 * phi).sin_cos();
+        let cot = cos / sin;
+        let c = (1.0 - 0.5 * phi * cot) / phi2;
+        // c φ² = 1 − (φ/2) cot(φ/2), differentiated
+        let dc = (-0.5 * cot + 0.25 * phi / (sin * sin)) / phi2 - 2.0 * c / phi;
+        (c, dc / phi)
+    }
+}
+
+/// exp(Φ̂), the rotation by the angle |Φ| about Φ (Rodrigues' formula).
+#[inline]
+pub fn exp(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let phi2 = phi.norm_squared();
+    let (a, b, _) = exp_coefficients(phi2);
+    let mut rotation = phi * phi.transpose() * b;
+    let diagonal = 1.0 - b * phi2;
+    rotation[(0, 0)] += diagonal;
+    rotation[(1, 1)] += diagonal;
+    rotation[(2, 2)] += diagonal;
+    rotation + hat(&(phi * a))
+}
+
+/// The Φ of least length with exp(Φ̂) = R.
+#[inline]
+pub fn log(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    let r = rotation;
+    let axial = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]) * 0.5; // Φ sin φ/φ
+    let cos = 0.5 * (r.trace() - 1.0);
+    let sin2 = axial.norm_squared();
+    if cos > 0.8 {
+        // φ/sin φ = asin(x)/x at x = sin φ ≤ 0.6: no cancellation, exact at 0
+        let x = sin2.sqrt();
+        return if x > 1e-4 { axial * (x.asin() / x) } else { axial * (1.0 + sin2 / 6.0) };
+    }
+    if cos > -0.8 {
+        let x = sin2.sqrt();
+        return axial * (x.atan2(cos) / x);
+    }
+    // near a half turn the axis comes from the quaternion, where it is large
+    let q = quaternion(r);
+    let v = Vector3::new(q[1], q[2], q[3]);
+    let norm = v.norm();
+    v * (2.0 * norm.atan2(q[0]) / norm)
+}
+
+/// J_r(Φ).
+#[inline]
+pub fn right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let phi2 = phi.norm_squared();
+    let (_, b, d) = exp_coefficients(phi2);
+    let mut jacobian = phi * phi.transpose() * d - hat(&(phi * b));
+    let diagonal = 1.0 - d * phi2;
+    jacobian[(0, 0)] += diagonal;
+    jacobian[(1, 1)] += diagonal;
+    jacobian[(2, 2)] += diagonal;
+    jacobian
+}
+
+/// J_r⁻¹(Φ), |Φ| < 2π.
+#[inline]
+pub fn inverse_right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+    let phi2 = phi.norm_squared();
+    let (c, _) = inverse_coefficients(phi2);
+    let mut jacobian = phi * phi.transpose() * c + hat(&(phi * 0.5));
+    let diagonal = 1.0 - c * phi2;
+    jacobian[(0, 0)] += diagonal;
+    jacobian[(1, 1)] += diagonal;
+    jacobian[(2, 2)] += diagonal;
+    jacobian
+}
+
+/// Φ_s = J_r⁻¹(Φ) κ and its derivative by Φ at fixed κ.
+#[inline]
+pub fn rate_of_log(phi: &Vector3<f64>, kappa: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+    let (c, dc) = inverse_coefficients(phi.norm_squared());
+    let once = phi.cross(kappa);
+    let twice = phi.cross(&once);
+    let value = kappa + once * 0.5 + twice * c;
+    // ∂(Φ×κ) = −κ̂,  ∂(Φ×(Φ×κ)) = −(Φ×κ)^ − Φ̂κ̂,  Φ̂κ̂ = κΦᵀ − (Φ·κ)1
+    let dot = phi.dot(kappa) * c;
+    let mut derivative = (twice * dc - kappa * c) * phi.transpose() - hat(&(kappa * 0.5 + once * c));
+    derivative[(0, 0)] += dot;
+    derivative[(1, 1)] += dot;
+    derivative[(2, 2)] += dot;
+    (value, derivative)
+}
+
+/// R with the rounding of many products removed: one Newton step towards RᵀR = 1.
+#[inline]
+pub fn orthonormalised(rotation: &Matrix3<f64>) -> Matrix3<f64> {
+    rotation * (Matrix3::from_diagonal_element(1.5) - rotation.transpose() * rotation * 0.5)
+}
+
+/// The rotation of the unit quaternion (w, x, y, z).
+pub fn from_quaternion(q: &Vector4<f64>) -> Matrix3<f64> {
+    let v = Vector3::new(q[1], q[2], q[3]);
+    Matrix3::identity() + hat(&v) * (2.0 * q[0]) + hat(&v) * hat(&v) * 2.0
+}
+
+/// The unit quaternion (w, x, y, z), w ≥ 0, of a rotation (Shepperd's choice of the largest component).
+pub fn quaternion(rotation: &Matrix3<f64>) -> Vector4<f64> {
+    let r = rotation;
+    let trace = r.trace();
+    let diagonal = [trace, r[(0, 0)], r[(1, 1)], r[(2, 2)]];
+    let largest = (1..4).fold(0, |best, i| if diagonal[i] > diagonal[best] { i } else { best });
+    let skew = [r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]];
+    let q = match largest {
+        0 => Vector4::new(1.0 + trace, skew[0], skew[1], skew[2]),
+        i => {
+            let (i, j, k) = (i - 1, i % 3, (i + 1) % 3);
+            let mut q = Vector4::zeros();
+            q[0] = skew[i];
+            q[1 + i] = 1.0 + 2.0 * r[(i, i)] - trace;
+            q[1 + j] = r[(i, j)] + r[(j, i)];
+            q[1 + k] = r[(i, k)] + r[(k, i)];
+            q
+        }
+    };
+    let q = q.normalize();
+    if q[0] < 0.0 { -q } else { q }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Angles where a branch, a series or the half turn could go wrong.
+    const ANGLES: [f64; 14] = [
+        0.0,
+        1e-300,
+        1e-12,
+        1e-4,
+        0.1,
+        0.499_999_999_999,
+        0.5,
+        0.643,
+        1.0,
+        2.0,
+        2.5,
+        3.0,
+        std::f64::consts::PI - 1e-6,
+        std::f64::consts::PI - 1e-12,
+    ];
+
+    fn vectors() -> impl Iterator<Item = Vector3<f64>> {
+        let axes =
+            [Vector3::x(), -Vector3::y(), Vector3::z(), Vector3::new(0.36, -0.48, 0.8), Vector3::new(-0.6, 0.0, 0.8)];
+        ANGLES.iter().flat_map(move |angle| axes.map(|axis| axis * *angle))
+    }
+
+    #[test]
+    fn exp_is_a_rotation_and_log_its_inverse() {
+        for phi in vectors() {
+            let rotation = exp(&phi);
+            // a few roundings of entries of size 1
+            assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-15);
+            // near the half turn the rotation vector is conditioned like 1/(π − φ) only through its sign: compare rotations
+            assert!((exp(&log(&rotation)) - rotation).amax() < 2e-15, "{phi}");
+            if phi.norm() < 3.0 {
+                assert!((log(&rotation) - phi).norm() <= 4e-15 * (1.0 + phi.norm()), "{phi}");
+            }
+            let q = quaternion(&rotation);
+            assert!((from_quaternion(&q) - rotation).amax() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn jacobians_are_inverse_and_differentiate_exp() {
+        let direction = Vector3::new(0.3, -0.7, 0.2);
+        for phi in vectors() {
+            let product = right_jacobian(&phi) * inverse_right_jacobian(&phi);
+            assert!((product - Matrix3::identity()).amax() < 1e-14);
+            // exp(Φ)ᵀ exp(Φ + ε e) = exp(ε J_r e) + O(ε²); central difference: O(ε²) = 1e-10
+            let eps = 1e-5;
+            let forward = log(&(exp(&phi).transpose() * exp(&(phi + direction * eps))));
+            let backward = log(&(exp(&phi).transpose() * exp(&(phi - direction * eps))));
+            let difference = (forward - backward) / (2.0 * eps);
+            assert!((difference - right_jacobian(&phi) * direction).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn rate_of_log_has_its_derivative() {
+        let kappa = Vector3::new(1.3, -0.4, 2.1);
+        let direction = Vector3::new(0.3, -0.7, 0.2);
+        for phi in vectors() {
+            let (value, derivative) = rate_of_log(&phi, &kappa);
+            assert!((value - inverse_right_jacobian(&phi) * kappa).norm() < 1e-14);
+            let eps = 1e-5;
+            let difference = (rate_of_log(&(phi + direction * eps), &kappa).0
+                - rate_of_log(&(phi - direction * eps), &kappa).0)
+                / (2.0 * eps);
+            assert!((difference - derivative * direction).norm() < 1e-9, "{phi}");
+        }
+    }
+}

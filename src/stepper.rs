@@ -1,0 +1,300 @@
+//! From one state to the next: Newton on the lifted unknowns, for a time step and for statics, and the consistent start.
+//!
+//! A step never changes the state it starts from; the new one is in [`Stepper::state`] after success only.
+
+use crate::alpha::Scheme;
+use crate::mesh::Mesh;
+use crate::pose::{self, Boundary, Row, Scales, State, Time};
+use crate::rod::Rod;
+use crate::sweep::{CellEnds, Increment, Point, Relation, Singular, Sweep, System};
+use nalgebra::Vector3;
+use std::fmt;
+
+/// Newton's iterations before the step is given up; a step that resolves the motion takes 3 to 5.
+const MAX_ITERATIONS: usize = 25;
+/// The same with relaxation μ = ½, where each iteration gains at most one bit of the residual.
+const MAX_RELAXED_ITERATIONS: usize = 60;
+/// Largest rotation of a section in one iteration, rad: beyond it the linearisation of a rotation means little.
+const MAX_ROTATION: f64 = 0.7;
+/// Increment, scaled, after which Newton has converged: the next would be of the order of its square.
+const TOLERANCE: f64 = 1e-8;
+/// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
+const ROUNDINGS: f64 = 256.0;
+
+/// Part of the static loads below which the equilibrium is given up.
+const SMALLEST_LOAD_PART: f64 = 1e-4;
+
+/// How an iteration ended well.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Report {
+    /// Newton iterations, those before a restart included.
+    pub iterations: usize,
+    /// Largest scaled residual before the last increment.
+    pub residual: f64,
+    /// What it took.
+    pub termination: Termination,
+}
+
+/// The ways to converge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Termination {
+    /// With full (limited) Newton steps.
+    Newton,
+    /// With under-relaxation, after full steps failed.
+    Relaxed,
+}
+
+/// An iteration that did not converge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Diverged {
+    /// Newton iterations spent.
+    pub iterations: usize,
+    /// Largest scaled residual at the end.
+    pub residual: f64,
+    /// Why it ended.
+    pub reason: Reason,
+}
+
+/// The ways to fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// The increments did not become small.
+    TooManyIterations,
+    /// The linearised equations of a cell are singular.
+    Singular {
+        /// Index of the cell from the base.
+        cell: usize,
+    },
+    /// A number overflowed.
+    NotFinite,
+}
+
+impl fmt::Display for Diverged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { iterations, residual, reason } = self;
+        write!(f, "no convergence after {iterations} iterations, scaled residual {residual:.1e}: ")?;
+        match reason {
+            Reason::TooManyIterations => write!(f, "too many iterations"),
+            Reason::Singular { cell } => write!(f, "singular in cell {}", cell + 1),
+            Reason::NotFinite => write!(f, "a number overflowed"),
+        }
+    }
+}
+
+impl std::error::Error for Diverged {}
+
+/// A rod on a mesh with the storage to move it; after its construction nothing is allocated.
+#[derive(Clone, Debug)]
+pub struct Stepper {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// The rod.
+    pub rod: Rod,
+    /// The present state.
+    pub state: State,
+    old: State,
+    trial: State,
+    system: System,
+    sweep: Sweep,
+}
+
+impl Stepper {
+    /// A rod in the given state.
+    pub fn new(mesh: Mesh, rod: Rod, state: State) -> Self {
+        let extensible = rod.is_extensible();
+        let system = System {
+            points: vec![Point::default(); mesh.points()],
+            cells: vec![CellEnds::default(); mesh.cells.len()],
+            mass: 0.0,
+            extensible,
+            base: Default::default(),
+            tip: Relation::default(),
+        };
+        let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
+        Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep }
+    }
+
+    /// One step of `dt` s to `boundary`.
+    ///
+    /// # Errors
+    /// [`Diverged`]; the state is as before.
+    pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
+        self.old.copy_from(&self.state);
+        for memory in &mut self.old.memory {
+            memory.spin = scheme.rebased(&memory.spin, self.state.dt, dt);
+            memory.travel = scheme.rebased(&memory.travel, self.state.dt, dt);
+            memory.strain = scheme.rebased(&memory.strain, self.state.dt, dt);
+        }
+        self.solve(boundary, &Time::Step { scheme, dt, row })
+    }
+
+    /// The static equilibrium under `boundary`, reached from the present state by Newton.
+    ///
+    /// # Errors
+    /// [`Diverged`]; the state is as before.
+    pub fn relax(&mut self, boundary: &Boundary) -> Result<Report, Diverged> {
+        self.old.copy_from(&self.state);
+        self.solve(boundary, &Time::Static)
+    }
+
+    fn solve(&mut self, boundary: &Boundary, time: &Time) -> Result<Report, Diverged> {
+        let full = self.newton(boundary, time, 1.0, MAX_ITERATIONS);
+        let result = match full {
+            Ok((iterations, residual)) => Ok(Report { iterations, residual, termination: Termination::Newton }),
+            Err(first) => match self.newton(boundary, time, 0.5, MAX_RELAXED_ITERATIONS) {
+                Ok((iterations, residual)) => Ok(Report {
+                    iterations: first.iterations + iterations,
+                    residual,
+                    termination: Termination::Relaxed,
+                }),
+                Err(second) => Err(Diverged { iterations: first.iterations + second.iterations, ..second }),
+            },
+        }?;
+        self.trial.settle(&self.mesh, &self.rod, &self.old, boundary, time);
+        std::mem::swap(&mut self.state, &mut self.trial);
+        Ok(result)
+    }
+
+    /// Newton with relaxation `mu` from the last configuration; the result is in `trial`.
+    fn newton(
+        &mut self,
+        boundary: &Boundary,
+        time: &Time,
+        relaxation: f64,
+        max_iterations: usize,
+    ) -> Result<(usize, f64), Diverged> {
+        let Self { mesh, rod, system, sweep, old, trial, .. } = self;
+        trial.copy_from(old);
+        let (scales, rounding) = scales(mesh, rod, old, boundary, time);
+        let row = match time {
+            Time::Static => Row::Positions,
+            Time::Step { row, .. } => *row,
+        };
+        let mut residual = f64::INFINITY;
+        for iteration in 1..=max_iterations {
+            let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
+            residual = pose::assemble(mesh, rod, old, trial, boundary, time, &scales, system);
+            if !residual.is_finite() {
+                return Err(diverged(residual, Reason::NotFinite));
+            }
+            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular { cell: s.cell }))?;
+
+            let (mut turn, mut force, mut moment) = (0.0f64, 0.0f64, 0.0f64);
+            for delta in sweep.nodes.iter().chain(&sweep.points) {
+                turn = turn.max(delta.phi.norm());
+                force = force.max(delta.n.amax());
+                moment = moment.max(delta.m.amax());
+            }
+            if !(turn + force + moment).is_finite() {
+                return Err(diverged(residual, Reason::NotFinite));
+            }
+            let limited = relaxation * (MAX_ROTATION / turn).min(1.0);
+            let converged = turn < TOLERANCE
+                && force < (TOLERANCE * scales.force).max(ROUNDINGS * rounding)
+                && moment < (TOLERANCE * scales.moment).max(ROUNDINGS * rounding * mesh.length());
+            // the last increment is taken in full: it is small
+            trial.apply(&sweep.nodes, &sweep.points, if converged { 1.0 } else { limited }, row);
+            if converged {
+                return Ok((iteration, residual));
+            }
+        }
+        Err(Diverged { iterations: max_iterations, residual, reason: Reason::TooManyIterations })
+    }
+
+    /// The static equilibrium under `boundary`, its loads applied in as many parts as Newton needs.
+    ///
+    /// # Errors
+    /// [`Diverged`] of the smallest part; the state is as before.
+    pub fn equilibrium(&mut self, boundary: &Boundary) -> Result<Report, Diverged> {
+        let begin = self.state.clone();
+        let (mut done, mut part) = (0.0, 1.0);
+        let mut iterations = 0;
+        loop {
+            let share = f64::min(done + part, 1.0);
+            let loaded = Boundary {
+                gravity: boundary.gravity * share,
+                tip_force: boundary.tip_force * share,
+                tip_moment: boundary.tip_moment * share,
+                ..*boundary
+            };
+            match self.relax(&loaded) {
+                Ok(report) => {
+                    iterations += report.iterations;
+                    done = share;
+                    if done == 1.0 {
+                        return Ok(Report { iterations, ..report });
+                    }
+                    part *= 2.0;
+                }
+                Err(diverged) => {
+                    iterations += diverged.iterations;
+                    part *= 0.25;
+                    if part < SMALLEST_LOAD_PART {
+                        self.state = begin;
+                        return Err(Diverged { iterations, ..diverged });
+                    }
+                }
+            }
+        }
+    }
+
+    /// The increments of the static rod about the present state under loads that `load` writes into the residuals.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the stiffness is singular.
+    pub fn linear_statics(
+        &mut self,
+        boundary: &Boundary,
+        load: impl Fn(&Mesh, &Rod, &State, &mut System),
+    ) -> Result<(&[Increment], &[Increment]), Diverged> {
+        let (scales, _) = scales(&self.mesh, &self.rod, &self.state, boundary, &Time::Static);
+        let Self { mesh, rod, state, system, sweep, .. } = self;
+        let residual = pose::assemble(mesh, rod, state, state, boundary, &Time::Static, &scales, system);
+        load(mesh, rod, state, system);
+        let singular = |s: Singular| Diverged { iterations: 1, residual, reason: Reason::Singular { cell: s.cell } };
+        sweep.solve(system).map_err(singular)?;
+        Ok((&sweep.nodes, &sweep.points))
+    }
+
+    /// Consistent accelerations, and their rates, of the present state with its velocities: what the equations of motion give
+    /// for ω_t and a at a start, where no history tells them. Only for rods without shear and stretch.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the equations of a cell are singular; the state is as before.
+    pub fn start(&mut self, boundary: &Boundary) -> Result<(), Diverged> {
+        let singular = |cell| Diverged { iterations: 1, residual: f64::INFINITY, reason: Reason::Singular { cell } };
+        self.trial.copy_from(&self.state);
+        self.trial.base = boundary.base;
+        pose::assemble_accelerations(&self.mesh, &self.rod, &mut self.trial, boundary, &mut self.system);
+        self.sweep.solve(&self.system).map_err(|s| singular(s.cell))?;
+        self.trial.take_accelerations(&self.rod, &self.sweep.nodes, &self.sweep.points);
+
+        pose::assemble_jerks(&self.mesh, &self.rod, &mut self.trial, &self.sweep, &mut self.system);
+        self.sweep.solve(&self.system).map_err(|s| singular(s.cell))?;
+        self.trial.take_jerks(&self.rod, &self.sweep.nodes, &self.sweep.points);
+        std::mem::swap(&mut self.state, &mut self.trial);
+        Ok(())
+    }
+}
+
+/// Sizes of forces, moments and accumulated vectors in this step, and the rounding error of a force.
+fn scales(mesh: &Mesh, rod: &Rod, old: &State, boundary: &Boundary, time: &Time) -> (Scales, f64) {
+    let length = mesh.length();
+    let stiffness = rod.stiffness.amax();
+    let finest = mesh.cells.iter().fold(f64::INFINITY, |h, cell| h.min(cell.length));
+    let carried =
+        |field: fn(&pose::Section) -> Vector3<f64>| old.nodes.iter().map(|n| field(n).amax()).fold(0.0, f64::max);
+    let weight = (rod.mass_per_length * length + rod.tip_mass) * boundary.gravity.amax();
+    let force = carried(|n| n.force) + boundary.tip_force.amax() + weight + 1e-3 * stiffness / (length * length);
+    let moment = carried(|n| n.moment) + boundary.tip_moment.amax() + 1e-3 * (stiffness / length + weight * length);
+    let (w, inertia) = match time {
+        Time::Static => (length, 0.0),
+        Time::Step { scheme, dt, row } => {
+            let weight = scheme.rate_weight(*dt).powi(2);
+            let inertia = rod.mass_per_length * length * length * weight;
+            (if *row == Row::Positions { length } else { length * weight }, inertia)
+        }
+    };
+    let rounding = f64::EPSILON * (stiffness / (finest * finest) + inertia + force);
+    (Scales { w, force, moment }, rounding)
+}
