@@ -13,7 +13,7 @@
 //! On a smooth motion the scheme's rates differ from the true ones by a *shift* that depends on Δt,
 //!
 //! ```text
-//! ẋᵢ = ẋ + (½−γ) Δt a + e Δt² ȧ,  e = 1/6 − γ(1−γ)        vᵢ = ẋ + (e + αγ − β/2) Δt² ȧ
+//! ẋᵢ = v + (½−γ) Δt a + e Δt² ȧ,  e = 1/6 − γ(1−γ)          vᵢ = v + (e + αγ − β/2) Δt² ȧ
 //! ```
 //!
 //! up to O(Δt³). A start, and a change of Δt, put the rates there ([`Scheme::rebased`]); otherwise the acceleration of
@@ -109,18 +109,20 @@ impl Scheme {
         [first, second, second + alpha * gamma - 0.5 * beta]
     }
 
-    /// The history after steps of `dt` for steps of `new`: the rates move with their shift. `dt` = 0 is the start of a
-    /// motion, where they are the true ones.
-    pub fn rebased(&self, old: &Motion, dt: f64, new: f64) -> Motion {
-        let [first, second, value] = self.shift();
-        let (by, by2) = (new - dt, new * new - dt * dt);
+    /// The history after steps of `dt` with the scheme `before`, for steps of `new` with this one: the rates move with their
+    /// shift. `dt` = 0 is the start of a motion, where they are the true ones.
+    pub fn rebased(&self, old: &Motion, before: &Self, dt: f64, new: f64) -> Motion {
+        let (from, to) = (before.shift(), self.shift());
+        let first = to[0] * new - from[0] * dt;
+        let second = to[1] * new * new - from[1] * dt * dt;
+        let value = to[2] * new * new - from[2] * dt * dt;
         let Motion { velocity, acceleration, jerk } = *old;
         Motion {
             velocity: Rate {
-                auxiliary: velocity.auxiliary + acceleration.value * (first * by) + jerk * (second * by2),
-                value: velocity.value + jerk * (value * by2),
+                auxiliary: velocity.auxiliary + acceleration.value * first + jerk * second,
+                value: velocity.value + jerk * value,
             },
-            acceleration: Rate { auxiliary: acceleration.auxiliary + jerk * (first * by), ..acceleration },
+            acceleration: Rate { auxiliary: acceleration.auxiliary + jerk * first, ..acceleration },
             jerk,
         }
     }
@@ -162,7 +164,7 @@ mod tests {
             let s = at(1.0);
             let e = Vector3::x();
             let start = Motion::starting(e * s[0], e * s[1], e * s[2]);
-            let mut motion = scheme.rebased(&start, 0.0, dt);
+            let mut motion = scheme.rebased(&start, &scheme, 0.0, dt);
             let mut worst = 0.0f64;
             for i in 0..5 {
                 let t = 1.0 + i as f64 * dt;

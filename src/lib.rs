@@ -10,4 +10,5 @@ pub mod pose;
 pub mod energy;
 pub mod stepper;
 pub mod modes;
+pub mod path;
 pub mod unit;

@@ -34,6 +34,8 @@ pub struct Section {
     pub position: Vec3,
     /// R.
     pub rotation: Mat3,
+    /// Φ: the rotation from the cell's first node (of a node: from the node before it), rad; continuous beyond a half turn.
+    pub turn: Vec3,
     /// n, N: what the part s⁺ exerts on the part s⁻.
     pub force: Vec3,
     /// m, N·m.
@@ -45,7 +47,7 @@ pub struct Section {
 impl Default for Section {
     fn default() -> Self {
         let zero = Vec3::zeros();
-        Self { position: zero, rotation: Mat3::identity(), force: zero, moment: zero, acceleration: zero }
+        Self { position: zero, rotation: Mat3::identity(), turn: zero, force: zero, moment: zero, acceleration: zero }
     }
 }
 
@@ -111,6 +113,10 @@ pub struct State {
     pub base: Base,
     /// Length of the step that led here, s; 0 at a start.
     pub dt: f64,
+    /// Scheme of that step.
+    pub scheme: Scheme,
+    /// Acceleration row of that step.
+    pub row: Row,
 }
 
 /// Where the acceleration of the centreline comes from.
@@ -186,16 +192,20 @@ impl State {
             memory: vec![Memory::default(); mesh.points() + 1],
             base: *base,
             dt: 0.0,
+            scheme: Scheme::BACKWARD_EULER,
+            row: Row::Rotations,
         };
         state.nodes[0].rotation = base.rotation;
         for (j, cell) in mesh.cells.iter().enumerate() {
             let R_0 = state.nodes[j].rotation;
             for k in 0..stages {
                 let point = j * stages + k;
-                state.points[point].rotation = R_0 * so3::exp(&(cell.kappa_rest * (cell.length * mesh.rule.c[k])));
+                state.points[point].turn = cell.kappa_rest * (cell.length * mesh.rule.c[k]);
+                state.points[point].rotation = R_0 * so3::exp(&state.points[point].turn);
                 state.memory[point].kappa = cell.kappa_rest;
             }
-            state.nodes[j + 1].rotation = R_0 * so3::exp(&(cell.kappa_rest * cell.length));
+            state.nodes[j + 1].turn = cell.kappa_rest * cell.length;
+            state.nodes[j + 1].rotation = R_0 * so3::exp(&state.nodes[j + 1].turn);
         }
         state.rebuild_positions(mesh, &Rod { compliance: Vec3::zeros(), ..Rod::circular(1.0, 1.0, 1.0, 1.0) });
         state.move_rigidly();
@@ -279,6 +289,8 @@ impl State {
         self.memory.copy_from_slice(&other.memory);
         self.base = other.base;
         self.dt = other.dt;
+        self.scheme = other.scheme;
+        self.row = other.row;
     }
 
     /// Applies μ times the increments of a sweep.
@@ -303,12 +315,8 @@ impl State {
             section.force = solved.n;
             section.moment = solved.m;
         }
-        let tip = &self.nodes[self.nodes.len() - 1];
-        for (memory, (section, solved)) in self
-            .memory
-            .iter_mut()
-            .zip(self.points.iter().zip(points).chain(std::iter::once((tip, &nodes[nodes.len() - 1]))))
-        {
+        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, nodes, points));
+        for (memory, (section, solved)) in self.memory.iter_mut().zip(self.points.iter().zip(points).chain([tip])) {
             let (spin, travel) = (&memory.spin.velocity.value, &memory.travel.velocity.value);
             let zero = Vec3::zeros();
             memory.spin = Motion::starting(*spin, section.rotation.tr_mul(&solved.phi), zero);
@@ -319,12 +327,8 @@ impl State {
     /// Takes the solution of [`assemble_jerks`] as ω_tt and a_t.
     pub fn take_jerks(&mut self, rod: &Rod, nodes: &[Increment], points: &[Increment]) {
         let drag = rod.drag_rate();
-        let tip = &self.nodes[self.nodes.len() - 1];
-        for (memory, (section, solved)) in self
-            .memory
-            .iter_mut()
-            .zip(self.points.iter().zip(points).chain(std::iter::once((tip, &nodes[nodes.len() - 1]))))
-        {
+        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, nodes, points));
+        for (memory, (section, solved)) in self.memory.iter_mut().zip(self.points.iter().zip(points).chain([tip])) {
             memory.spin.jerk = section.rotation.tr_mul(&solved.phi);
             memory.travel.jerk = solved.w - memory.travel.acceleration.value * drag;
         }
@@ -335,6 +339,14 @@ impl State {
         self.base = boundary.base;
         for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
             section.rotation = so3::orthonormalised(&section.rotation);
+        }
+        let stages = mesh.rule.stages;
+        for j in 0..mesh.cells.len() {
+            let R_0 = self.nodes[j].rotation;
+            let sections = self.points[j * stages..][..stages].iter_mut().chain([&mut self.nodes[j + 1]]);
+            for section in sections {
+                section.turn = so3::log_near(&R_0.tr_mul(&section.rotation), &section.turn);
+            }
         }
         let drag = rod.drag_rate();
         let tip = self.nodes.len() - 1;
@@ -358,6 +370,8 @@ impl State {
             Time::Static => self.move_rigidly(),
             Time::Step { scheme, dt, row } => {
                 self.dt = *dt;
+                self.scheme = *scheme;
+                self.row = *row;
                 self.rebuild_accelerations(mesh, rod);
                 if *row == Row::Rotations {
                     self.rebuild_velocities(mesh);
@@ -401,6 +415,13 @@ impl State {
             tip.travel.velocity.value = start;
         }
     }
+}
+
+/// The solution of a start at the tip. The section there follows its neighbour unless a body makes it a variable of its own: its
+/// extrapolation along the cells would amplify whatever is not smooth at a start.
+fn end_of(rod: &Rod, nodes: &[Increment], points: &[Increment]) -> Increment {
+    let (tip, last) = (nodes[nodes.len() - 1], points[points.len() - 1]);
+    if rod.tip_inertia > 0.0 { tip } else { Increment { phi: last.phi, ..tip } }
 }
 
 #[inline]
@@ -508,7 +529,7 @@ pub fn assemble(
 
             // R_s = R κ̂ as Φ_s = J_r⁻¹(Φ) κ, and the law
             let law = Law::new(rod, &cell.kappa_rest, time, past);
-            let phi = so3::log(&node_0.rotation.tr_mul(R));
+            let phi = so3::log_near(&node_0.rotation.tr_mul(R), &section.turn);
             let (phi_s, phi_s_phi) = so3::rate_of_log(&phi, &law.kappa(section));
             let J = so3::right_jacobian(&phi);
             (log[k], g[k]) = (phi, phi_s);
@@ -585,7 +606,7 @@ pub fn assemble(
                 .max(point.e_n.amax() / scales.force)
                 .max(point.e_m.amax() / scales.moment);
         }
-        let log_1 = so3::log(&node_0.rotation.tr_mul(&node_1.rotation));
+        let log_1 = so3::log_near(&node_0.rotation.tr_mul(&node_1.rotation), &node_1.turn);
         let ends: &mut CellEnds = &mut system.cells[j];
         ends.length = h;
         ends.spin = node_1.rotation * so3::right_jacobian(&log_1);
@@ -726,12 +747,10 @@ pub fn assemble_jerks(mesh: &Mesh, rod: &Rod, state: &mut State, sweep: &Sweep, 
 fn strain_acceleration(mesh: &Mesh, state: &State, sweep: &Sweep, point: usize) -> Vec3 {
     let stages = mesh.rule.stages;
     let (j, k) = (point / stages, point % stages);
-    let R_0 = &state.nodes[j].rotation;
     let log_tt = |i: usize| {
-        let R = &state.points[i].rotation;
-        let phi = so3::log(&R_0.tr_mul(R));
-        let turn = R.tr_mul(&(sweep.points[i].phi - sweep.nodes[j].phi));
-        (phi, so3::inverse_right_jacobian(&phi) * turn)
+        let Section { rotation: R, turn: phi, .. } = &state.points[i];
+        let turn_tt = R.tr_mul(&(sweep.points[i].phi - sweep.nodes[j].phi));
+        (*phi, so3::inverse_right_jacobian(phi) * turn_tt)
     };
     let phi_s_tt = (0..stages).fold(Vec3::zeros(), |sum, l| {
         sum + log_tt(j * stages + l).1 * (mesh.rule.a_inverse[k][l] / mesh.cells[j].length)

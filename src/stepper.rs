@@ -2,7 +2,7 @@
 //!
 //! A step never changes the state it starts from; the new one is in [`Stepper::state`] after success only.
 
-use crate::alpha::Scheme;
+use crate::alpha::{Motion, Scheme};
 use crate::mesh::Mesh;
 use crate::pose::{self, Boundary, Row, Scales, State, Time};
 use crate::rod::Rod;
@@ -21,6 +21,13 @@ const TOLERANCE: f64 = 1e-8;
 /// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
 const ROUNDINGS: f64 = 256.0;
 
+/// Turn of a section in a step up to which the step resolves the motion, rad: well below the angles (about 1 rad) where Newton on the
+/// accelerations of the rotations begins to fail and energy to grow.
+const RESOLVED: f64 = 0.35;
+/// The same to come back from steps that did not, lower so that the two do not alternate.
+const RESOLVED_AGAIN: f64 = 0.25;
+/// Turn of a section in the first step by its initial acceleration alone, up to which that acceleration says how the motion begins.
+const RESOLVED_START: f64 = 0.01;
 /// Part of the static loads below which the equilibrium is given up.
 const SMALLEST_LOAD_PART: f64 = 1e-4;
 
@@ -114,16 +121,59 @@ impl Stepper {
         Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep }
     }
 
-    /// One step of `dt` s to `boundary`.
+    /// One step of `dt` s to `boundary` in the way that suits it.
+    ///
+    /// A step that resolves the motion uses `scheme` and the accelerations of the section rotations, whose reaction does not ring.
+    /// One that would turn a section further than it can follow, or one that Newton loses, uses the accelerations of the
+    /// positions with spectral radius 0: there Newton converges at any step size and energy falls. After anything else such
+    /// steps begin with implicit Euler, which needs no auxiliary rates.
+    ///
+    /// # Errors
+    /// [`Diverged`]; the state is as before.
+    pub fn advance(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64) -> Result<Report, Diverged> {
+        let started = self.state.dt > 0.0;
+        let coarse = self.state.dt == dt && self.state.row == Row::Positions;
+        let points = &self.state.memory[..self.mesh.points()];
+        let most = |size: fn(&Motion) -> f64| points.iter().map(|memory| size(&memory.spin)).fold(0.0, f64::max);
+        let turn = dt * most(|spin| spin.velocity.value.norm());
+        // what an acceleration adds counts where it takes part as if it were constant: where the auxiliary rates begin anew
+        let bend = 0.5 * dt * dt * most(|spin| spin.acceleration.value.norm());
+        let resolved = match (started, coarse) {
+            (false, _) => turn < RESOLVED && bend < RESOLVED_START,
+            (true, true) => turn + bend < RESOLVED_AGAIN,
+            (true, false) => turn < RESOLVED,
+        };
+        let mut lost = 0;
+        if resolved && !self.rod.is_extensible() {
+            match self.step(boundary, scheme, dt, Row::Rotations) {
+                Ok(report) => return Ok(report),
+                Err(diverged) => lost = diverged.iterations,
+            }
+        }
+        let scheme = match (self.rod.is_extensible() && resolved, coarse && started) {
+            (true, _) if started => scheme,
+            (_, true) => Scheme::from_spectral_radius(0.0),
+            _ => Scheme::BACKWARD_EULER,
+        };
+        let count = |iterations| lost + iterations;
+        self.step(boundary, scheme, dt, Row::Positions)
+            .map(|report| Report { iterations: count(report.iterations), ..report })
+            .map_err(|diverged| Diverged { iterations: count(diverged.iterations), ..diverged })
+    }
+
+    /// One step of `dt` s to `boundary` with a given scheme and acceleration row.
     ///
     /// # Errors
     /// [`Diverged`]; the state is as before.
     pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
         self.old.copy_from(&self.state);
-        for memory in &mut self.old.memory {
-            memory.spin = scheme.rebased(&memory.spin, self.state.dt, dt);
-            memory.travel = scheme.rebased(&memory.travel, self.state.dt, dt);
-            memory.strain = scheme.rebased(&memory.strain, self.state.dt, dt);
+        if (scheme, dt) != (self.state.scheme, self.state.dt) && scheme != Scheme::BACKWARD_EULER {
+            let rebased = |motion: &Motion| scheme.rebased(motion, &self.state.scheme, self.state.dt, dt);
+            for memory in &mut self.old.memory {
+                memory.spin = rebased(&memory.spin);
+                memory.travel = rebased(&memory.travel);
+                memory.strain = rebased(&memory.strain);
+            }
         }
         self.solve(boundary, &Time::Step { scheme, dt, row })
     }

@@ -1,0 +1,252 @@
+//! The motion of the base between communication points: one C¹ path through what the host samples.
+//!
+//! Within a communication step of length H the path has a constant acceleration, so that it begins with the velocity it had
+//! and ends with
+//!
+//! ```text
+//! v* = v + v̇ H + (r − r_path)/T
+//! ```
+//!
+//! v is the sampled velocity, v̇ its change over the last step, and the last term feeds the distance between the sampled
+//! position and the path back over the time T: positions rounded by a few digits do not shake the acceleration, and a path
+//! that missed something returns. Rotations do the same through exp, in world axes.
+
+use crate::pose::Base;
+use crate::so3;
+use nalgebra::{Matrix3, Vector3};
+
+type Vec3 = Vector3<f64>;
+type Mat3 = Matrix3<f64>;
+
+/// Shortest time over which a distance between samples and path is fed in, s.
+const FEED_TIME: f64 = 0.1;
+/// The same in communication steps, so that the feedback is far from its stability limit of two steps.
+const FEED_STEPS: f64 = 10.0;
+/// Memory of the tracker that derives a twist from poses, s.
+const TRACK_TIME: f64 = 0.02;
+/// The same in communication steps.
+const TRACK_STEPS: f64 = 1.5;
+
+/// Which samples the host gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Given {
+    /// Pose and twist.
+    PoseAndTwist,
+    /// Pose; the twist is derived.
+    Pose,
+    /// Twist; the pose is integrated from the first one.
+    Twist,
+}
+
+/// What the host samples at a communication point, world frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Position, m.
+    pub position: Vec3,
+    /// Orientation.
+    pub rotation: Mat3,
+    /// Velocity, m/s.
+    pub velocity: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular_velocity: Vec3,
+}
+
+/// A twist, or its rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Twist {
+    linear: Vec3,
+    angular: Vec3,
+}
+
+impl Twist {
+    fn map(self, f: impl Fn(Vec3) -> Vec3) -> Self {
+        Self { linear: f(self.linear), angular: f(self.angular) }
+    }
+
+    fn plus(self, factor: f64, other: Self) -> Self {
+        Self { linear: self.linear + other.linear * factor, angular: self.angular + other.angular * factor }
+    }
+}
+
+/// The path up to the last communication point, and what it remembers of the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    given: Given,
+    base: Base,
+    /// The last sample, or the tracker's estimate of it, with its rate.
+    last: Sample,
+    rate: Twist,
+    /// Length of the last communication step; 0 before the first.
+    last_step: f64,
+    samples: u32,
+}
+
+/// The path within one communication step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    start: Base,
+    acceleration: Twist,
+    /// The path as it will be at the end.
+    next: Path,
+    /// Distance of the sampled position from the path at the start of the step, m.
+    pub distance: f64,
+    /// The same of the orientation, rad.
+    pub angle: f64,
+}
+
+impl Sample {
+    fn twist(&self) -> Twist {
+        Twist { linear: self.velocity, angular: self.angular_velocity }
+    }
+}
+
+impl Path {
+    /// A path that begins at `sample`; at rest if the twist is not given.
+    pub fn new(given: Given, sample: Sample) -> Self {
+        let mut last = sample;
+        if given == Given::Pose {
+            (last.velocity, last.angular_velocity) = (Vec3::zeros(), Vec3::zeros());
+        }
+        let base = Base {
+            velocity: last.velocity,
+            angular_velocity: last.angular_velocity,
+            ..Base::at_rest(sample.position, sample.rotation)
+        };
+        Self { given, base, last, rate: Twist::default(), last_step: 0.0, samples: 0 }
+    }
+
+    /// The base at the last communication point.
+    pub fn base(&self) -> &Base {
+        &self.base
+    }
+
+    /// The path over the next `step` s, from a sample at its start.
+    pub fn segment(&self, sample: &Sample, step: f64) -> Segment {
+        let mut next = self.clone();
+        match self.given {
+            Given::Pose => next.track(sample),
+            Given::PoseAndTwist | Given::Twist => {
+                if self.last_step > 0.0 {
+                    let per_step = 1.0 / self.last_step;
+                    next.rate = sample.twist().plus(-1.0, self.last.twist()).map(|change| change * per_step);
+                }
+                next.last = *sample;
+            }
+        }
+        let mut away = Twist {
+            linear: next.last.position - self.base.position,
+            angular: so3::log(&(next.last.rotation * self.base.rotation.transpose())),
+        };
+        if self.given == Given::Twist {
+            away = Twist::default();
+        }
+        let feed = 1.0 / FEED_TIME.max(FEED_STEPS * step);
+        let target = next.last.twist().plus(step, next.rate).plus(feed, away);
+        let now = Twist { linear: self.base.velocity, angular: self.base.angular_velocity };
+        let acceleration = target.plus(-1.0, now).map(|change| change / step);
+        next.last_step = step;
+        next.samples = self.samples.saturating_add(1);
+        let mut segment =
+            Segment { start: self.base, acceleration, next, distance: away.linear.norm(), angle: away.angular.norm() };
+        segment.next.base = segment.at(step);
+        segment
+    }
+
+    /// Fading-memory fit of a parabola to the poses (the g-h-k filter with equal roots θ): position, twist and its rate.
+    fn track(&mut self, sample: &Sample) {
+        let step = self.last_step;
+        if self.samples == 0 {
+            return;
+        }
+        // at first the memory is no longer than the samples there are: two give a line, three a parabola
+        let theta = (-step / TRACK_TIME.max(TRACK_STEPS * step)).exp().min(1.0 - 2.0 / f64::from(self.samples.max(2)));
+        let (g, h, k) = match self.samples {
+            1 => (1.0, 1.0, 0.0),
+            _ => (1.0 - theta.powi(3), 1.5 * (1.0 - theta).powi(2) * (1.0 + theta), 0.5 * (1.0 - theta).powi(3)),
+        };
+        let predicted = self.last.twist().map(|v| v * step).plus(0.5 * step * step, self.rate);
+        let rotation = so3::exp(&predicted.angular) * self.last.rotation;
+        let position = self.last.position + predicted.linear;
+        let miss =
+            Twist { linear: sample.position - position, angular: so3::log(&(sample.rotation * rotation.transpose())) };
+        let twist = self.last.twist().plus(step, self.rate).plus(h / step, miss);
+        self.rate = self.rate.plus(2.0 * k / (step * step), miss);
+        self.last = Sample {
+            position: position + miss.linear * g,
+            rotation: so3::exp(&(miss.angular * g)) * rotation,
+            velocity: twist.linear,
+            angular_velocity: twist.angular,
+        };
+    }
+}
+
+impl Segment {
+    /// The base `time` s after the start of the step.
+    pub fn at(&self, time: f64) -> Base {
+        let Base { position, rotation, velocity, angular_velocity, .. } = self.start;
+        let Twist { linear, angular } = self.acceleration;
+        let turn = angular_velocity * time + angular * (0.5 * time * time);
+        Base {
+            position: position + velocity * time + linear * (0.5 * time * time),
+            rotation: so3::orthonormalised(&(so3::exp(&turn) * rotation)),
+            velocity: velocity + linear * time,
+            // the left Jacobian is the right one of −Φ
+            angular_velocity: so3::right_jacobian(&-turn) * (angular_velocity + angular * time),
+            acceleration: linear,
+        }
+    }
+
+    /// The path at the end of the step.
+    pub fn into_path(self) -> Path {
+        self.next
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn sample(position: f64, velocity: f64) -> Sample {
+        Sample {
+            position: Vec3::x() * position,
+            rotation: so3::exp(&(Vec3::z() * position)),
+            velocity: Vec3::x() * velocity,
+            angular_velocity: Vec3::z() * velocity,
+        }
+    }
+
+    /// Accelerations at the ends of the steps, and the distance of path and motion there, over `periods` of a sine.
+    fn sine(given: Given, per_period: usize, periods: usize) -> Vec<(f64, f64, f64)> {
+        let (w, h) = (TAU, 1.0 / per_period as f64);
+        // starts smoothly: the amplitude fades in over one period
+        let x = |t: f64| {
+            let fade = if t < 1.0 { t * t * t * (10.0 - 15.0 * t + 6.0 * t * t) } else { 1.0 };
+            fade * (w * t).sin()
+        };
+        let v = |t: f64| (x(t + 1e-6) - x(t - 1e-6)) / 2e-6;
+        let a = |t: f64| (x(t + 1e-4) - 2.0 * x(t) + x(t - 1e-4)) / 1e-8;
+        let mut path = Path::new(given, sample(0.0, 0.0));
+        (0..periods * per_period)
+            .map(|i| {
+                let t = i as f64 * h;
+                path = path.segment(&sample(x(t), v(t)), h).into_path();
+                (path.base.acceleration.x, a(t + h), path.base.position.x - x(t + h))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_sampled_sine_is_followed_at_first_order_in_every_mode() {
+        for given in [Given::PoseAndTwist, Given::Pose, Given::Twist] {
+            let error = |n| {
+                let steps = sine(given, n, 4);
+                steps[n..].iter().map(|(path, exact, _)| (path - exact).abs()).fold(0.0, f64::max) / (TAU * TAU)
+            };
+            let (coarse, fine, finest) = (error(20), error(40), error(80));
+            assert!(fine < 0.65 * coarse && finest < 0.65 * fine, "{given:?}: {coarse} {fine} {finest}");
+            // H a/2 per step at most: half a step late, and the extrapolation's own error
+            assert!(coarse < 1.2, "{given:?}: {coarse}");
+        }
+    }
+}
