@@ -62,7 +62,8 @@ pub fn modes(stepper: &mut Stepper, boundary: &Boundary, count: usize) -> Result
             }
         }
         let norm = product(stepper, &vector, &vector).sqrt();
-        if !(norm > 1e-10 * before) {
+        // what the space already holds adds nothing
+        if norm.is_nan() || norm <= 1e-10 * before {
             continue;
         }
         for (w, phi) in &mut vector {

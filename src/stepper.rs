@@ -28,6 +28,8 @@ const RESOLVED: f64 = 0.35;
 const RESOLVED_AGAIN: f64 = 0.25;
 /// Turn of a section in the first step by its initial acceleration alone, up to which that acceleration says how the motion begins.
 const RESOLVED_START: f64 = 0.01;
+/// Turn of a section in a step, rad, that no change of its acceleration need be smaller than.
+const NEGLIGIBLE: f64 = 1e-6;
 /// Part of the static loads below which the equilibrium is given up.
 const SMALLEST_LOAD_PART: f64 = 1e-4;
 
@@ -121,6 +123,12 @@ impl Stepper {
         Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep }
     }
 
+    /// The state before the last step.
+    pub fn previous(&self) -> &State {
+        // a step swaps the two
+        &self.trial
+    }
+
     /// One step of `dt` s to `boundary` in the way that suits it.
     ///
     /// A step that resolves the motion uses `scheme` and the accelerations of the section rotations, whose reaction does not ring.
@@ -132,33 +140,40 @@ impl Stepper {
     /// [`Diverged`]; the state is as before.
     pub fn advance(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64) -> Result<Report, Diverged> {
         let started = self.state.dt > 0.0;
-        let coarse = self.state.dt == dt && self.state.row == Row::Positions;
         let points = &self.state.memory[..self.mesh.points()];
         let most = |size: fn(&Motion) -> f64| points.iter().map(|memory| size(&memory.spin)).fold(0.0, f64::max);
         let turn = dt * most(|spin| spin.velocity.value.norm());
+        let floor = Scheme::from_spectral_radius(0.0);
+        if self.rod.is_extensible() {
+            let scheme = match (started, turn < RESOLVED) {
+                (false, _) => Scheme::BACKWARD_EULER,
+                (true, true) => scheme,
+                (true, false) => floor,
+            };
+            return self.step(boundary, scheme, dt, Row::Positions);
+        }
         // what an acceleration adds counts where it takes part as if it were constant: where the auxiliary rates begin anew
-        let bend = 0.5 * dt * dt * most(|spin| spin.acceleration.value.norm());
+        let acceleration = most(|spin| spin.acceleration.value.norm());
+        let bend = 0.5 * dt * dt * acceleration;
+        // and only if they last that long: where damping ends them sooner, they say nothing of the step
+        let lasting = dt * most(|spin| spin.jerk.norm()) <= acceleration + NEGLIGIBLE / (dt * dt);
+        let coarse = started && self.state.dt == dt && self.state.row == Row::Positions;
         let resolved = match (started, coarse) {
-            (false, _) => turn < RESOLVED && bend < RESOLVED_START,
+            (false, _) => turn < RESOLVED && bend < RESOLVED_START && lasting,
             (true, true) => turn + bend < RESOLVED_AGAIN,
             (true, false) => turn < RESOLVED,
         };
         let mut lost = 0;
-        if resolved && !self.rod.is_extensible() {
+        if resolved {
             match self.step(boundary, scheme, dt, Row::Rotations) {
                 Ok(report) => return Ok(report),
                 Err(diverged) => lost = diverged.iterations,
             }
         }
-        let scheme = match (self.rod.is_extensible() && resolved, coarse && started) {
-            (true, _) if started => scheme,
-            (_, true) => Scheme::from_spectral_radius(0.0),
-            _ => Scheme::BACKWARD_EULER,
-        };
-        let count = |iterations| lost + iterations;
+        let scheme = if coarse { floor } else { Scheme::BACKWARD_EULER };
         self.step(boundary, scheme, dt, Row::Positions)
-            .map(|report| Report { iterations: count(report.iterations), ..report })
-            .map_err(|diverged| Diverged { iterations: count(diverged.iterations), ..diverged })
+            .map(|report| Report { iterations: lost + report.iterations, ..report })
+            .map_err(|diverged| Diverged { iterations: lost + diverged.iterations, ..diverged })
     }
 
     /// One step of `dt` s to `boundary` with a given scheme and acceleration row.
@@ -307,11 +322,15 @@ impl Stepper {
     }
 
     /// Consistent accelerations, and their rates, of the present state with its velocities: what the equations of motion give
-    /// for ω_t and a at a start, where no history tells them. Only for rods without shear and stretch.
+    /// for ω_t and a at a start, where no history tells them. A rod that shears or stretches keeps accelerations of zero (and
+    /// takes its first step by implicit Euler): its centreline has dynamics of its own.
     ///
     /// # Errors
     /// [`Diverged`] if the equations of a cell are singular; the state is as before.
     pub fn start(&mut self, boundary: &Boundary) -> Result<(), Diverged> {
+        if self.rod.is_extensible() {
+            return Ok(());
+        }
         let singular = |cell| Diverged { iterations: 1, residual: f64::INFINITY, reason: Reason::Singular { cell } };
         self.trial.copy_from(&self.state);
         self.trial.base = boundary.base;

@@ -1,6 +1,19 @@
 //! The model without FMI: parameters and inputs in, one rod advanced by communication steps, outputs out.
+//!
+//! A communication step is cut into equal internal steps that land exactly on its end. One that diverges is halved, and its
+//! halves again if need be; if that does not help either, the unit is as it was before the communication step.
 
+use crate::alpha::Scheme;
+use crate::energy::Energy;
+use crate::mesh::{MAX_STAGES, Mesh};
+use crate::modes::{self, Mode};
+use crate::path::{Given, Path, Sample, Segment};
+use crate::pose::{Boundary, State};
+use crate::rod::Rod;
+use crate::so3;
+use crate::stepper::{Diverged, Stepper};
 use nalgebra::{Vector3, Vector4};
+use std::f64::consts::PI;
 use std::fmt;
 
 /// Number of stations of the centreline handed out for drawing, base and tip included.
@@ -122,23 +135,6 @@ impl Default for Inputs {
     }
 }
 
-/// Energies and works since the start, J: kinetic + elastic + gravity + dissipated grows by work_base + work_tip.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Energy {
-    /// Of the rod and the body at its tip.
-    pub kinetic: f64,
-    /// Stored in bending, twist and, if extensible, shear and stretch.
-    pub elastic: f64,
-    /// Potential of gravity, zero at the world origin.
-    pub gravity: f64,
-    /// Lost in Kelvin-Voigt damping and drag.
-    pub dissipated: f64,
-    /// Work the base has done on the rod.
-    pub work_base: f64,
-    /// Work the tip force and moment have done on the rod.
-    pub work_tip: f64,
-}
-
 /// What the host may read at every communication point, world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
@@ -180,12 +176,44 @@ pub enum Error {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// The rod has no static equilibrium that can be reached from its rest shape.
+    NoEquilibrium(Diverged),
+    /// The static equilibrium it would start from is unstable.
+    UnstableEquilibrium {
+        /// The lowest ω², 1/s².
+        omega_squared: f64,
+    },
+    /// The equations of motion at the start are singular.
+    NoStart(Diverged),
+    /// An internal step diverged however small it was made.
+    Diverged {
+        /// Time since the start of the communication step, s.
+        time: f64,
+        /// The smallest internal step tried, s.
+        step: f64,
+        /// How it ended.
+        cause: Diverged,
+    },
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotAllowed { name, value, allowed } => write!(f, "{name} = {value} is not allowed: {allowed}"),
+            Self::NoEquilibrium(cause) => {
+                write!(f, "start_in_equilibrium: no static equilibrium can be reached from the rest shape ({cause})")
+            }
+            Self::UnstableEquilibrium { omega_squared } => write!(
+                f,
+                "start_in_equilibrium: the static equilibrium is unstable (lowest squared frequency {omega_squared:.3e} 1/s2)"
+            ),
+            Self::NoStart(cause) => write!(f, "the equations of motion at the start have no solution ({cause})"),
+            Self::Diverged { time, step, cause } => {
+                write!(
+                    f,
+                    "the internal step of {step:.1e} s at {time:.6} s after the communication point failed: {cause}"
+                )
+            }
         }
     }
 }
@@ -195,42 +223,287 @@ impl std::error::Error for Error {}
 /// Something the host should know although the step succeeded; each kind is given once in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// `base.position` and `base.velocity` (or orientation and angular velocity) do not belong to one motion.
+    /// Pose and twist of the base do not belong to one motion.
     PoseAndTwistDisagree {
         /// Names of the two variables.
         names: [&'static str; 2],
-        /// How far apart, m or rad.
+        /// How far apart they have run.
         distance: f64,
+        /// m or rad.
+        unit: &'static str,
     },
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PoseAndTwistDisagree { names, distance } => {
-                write!(f, "{} and {} disagree by {distance}", names[0], names[1])
-            }
+            Self::PoseAndTwistDisagree { names: [pose, twist], distance, unit } => write!(
+                f,
+                "{pose} and the motion that {twist} describes are {distance:.3e} {unit} apart; the base follows {twist} and \
+                 is led back slowly (base.motion = 1 takes the pose alone, 2 the twist alone)"
+            ),
         }
     }
 }
 
+/// Distance of the sampled pose from the path, as a part of the rod's length or in rad, beyond which pose and twist disagree; half a
+/// communication step's motion is allowed on top, since the first steps do not know the acceleration.
+const DISAGREEMENT: f64 = 0.02;
+
+/// Halvings of an internal step before it is given up.
+const MAX_HALVINGS: u32 = 12;
+
 /// One rod, started and ready to step.
 #[derive(Clone, Debug)]
 pub struct Unit {
+    stepper: Stepper,
+    scheme: Scheme,
+    /// Longest internal step, s.
+    step: f64,
+    gravity: Vector3<f64>,
+    path: Path,
+    energy: Energy,
+    backup: State,
+    stations: [Station; STATIONS],
+    warned: bool,
+    counts: Counts,
     outputs: Outputs,
+}
+
+/// Work done since the start.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    steps: i32,
+    iterations: i32,
+    retries: i32,
+}
+
+/// Where a station lies in the mesh.
+#[derive(Clone, Copy, Debug, Default)]
+struct Station {
+    cell: usize,
+    theta: f64,
+}
+
+impl Parameters {
+    /// The section's numbers as the library takes them.
+    pub fn rod(&self) -> Rod {
+        let given = |value: f64, otherwise: f64| if value > 0.0 { value } else { otherwise };
+        let area = given(self.section_area, PI * self.radius * self.radius);
+        let round = PI * self.radius.powi(4) / 4.0;
+        let [i_1, i_2] = self.section_second_moment.map(|moment| given(moment, round));
+        let torsion = given(self.section_torsion_constant, i_1 + i_2);
+        let (e, g, rho) = (self.youngs_modulus, self.shear_modulus, self.density);
+        let shear = 1.0 / (self.section_shear_correction * g * area);
+        Rod {
+            stiffness: Vector3::new(e * i_1, e * i_2, g * torsion),
+            compliance: if self.extensible { Vector3::new(shear, shear, 1.0 / (e * area)) } else { Vector3::zeros() },
+            mass_per_length: rho * area,
+            inertia_per_length: Vector3::new(i_1, i_2, i_1 + i_2) * rho,
+            damping: Vector3::new(self.damping_bending, self.damping_bending, self.damping_twist),
+            drag: self.damping_drag,
+            tip_mass: self.tip_mass,
+            tip_inertia: self.tip_inertia,
+        }
+    }
+
+    /// Refuses what no rod can have.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] names the first parameter.
+    pub fn validate(&self) -> Result<(), Error> {
+        const POSITIVE: (f64, f64, &str) = (f64::MIN_POSITIVE, f64::MAX, "finite and > 0");
+        const NOT_NEGATIVE: (f64, f64, &str) = (0.0, f64::MAX, "finite and >= 0");
+        const FINITE: (f64, f64, &str) = (f64::MIN, f64::MAX, "finite");
+        let [i_1, i_2] = self.section_second_moment;
+        let (kappa, g) = (self.rest_curvature, self.gravity);
+        let checks = [
+            ("length", self.length, POSITIVE),
+            ("radius", self.radius, POSITIVE),
+            ("density", self.density, POSITIVE),
+            ("youngs_modulus", self.youngs_modulus, POSITIVE),
+            ("shear_modulus", self.shear_modulus, POSITIVE),
+            ("section.area", self.section_area, NOT_NEGATIVE),
+            ("section.second_moment[1]", i_1, NOT_NEGATIVE),
+            ("section.second_moment[2]", i_2, NOT_NEGATIVE),
+            ("section.torsion_constant", self.section_torsion_constant, NOT_NEGATIVE),
+            ("section.shear_correction", self.section_shear_correction, POSITIVE),
+            ("rest_curvature[1]", kappa.x, FINITE),
+            ("rest_curvature[2]", kappa.y, FINITE),
+            ("rest_curvature[3]", kappa.z, FINITE),
+            ("gravity[1]", g.x, FINITE),
+            ("gravity[2]", g.y, FINITE),
+            ("gravity[3]", g.z, FINITE),
+            ("damping.bending", self.damping_bending, NOT_NEGATIVE),
+            ("damping.twist", self.damping_twist, NOT_NEGATIVE),
+            ("damping.drag", self.damping_drag, NOT_NEGATIVE),
+            ("tip.mass", self.tip_mass, NOT_NEGATIVE),
+            ("tip.inertia", self.tip_inertia, NOT_NEGATIVE),
+            ("base.motion", f64::from(self.base_motion), (0.0, 2.0, "0 pose and twist, 1 pose, 2 twist")),
+            ("cells", f64::from(self.cells), (0.0, MAX_CELLS, "0 (automatic) to 100000")),
+            ("stages", f64::from(self.stages), (0.0, MAX_STAGES as f64, "0 (automatic) to 4")),
+            ("step", self.step, NOT_NEGATIVE),
+            ("tolerance", self.tolerance, NOT_NEGATIVE),
+            ("spectral_radius", self.spectral_radius, (0.0, 1.0, "0 to 1")),
+        ];
+        for (name, value, (least, most, allowed)) in checks {
+            if !(least..=most).contains(&value) {
+                return Err(Error::NotAllowed { name, value, allowed });
+            }
+        }
+        Ok(())
+    }
+
+    /// The cells: as given, or as many of four Gauss points as the bending length under the weight, the rest curvature and the
+    /// tolerance ask for.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
+    fn mesh(&self, rod: &Rod, inputs: &Inputs, tolerance: f64) -> Result<Mesh, Error> {
+        let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
+        let turn = self.rest_curvature.norm() * self.length;
+        let cells = if self.cells > 0 {
+            self.cells as usize
+        } else {
+            // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five cells of
+            // four points are right to 3e-4
+            let load = rod.mass_per_length * self.gravity.norm()
+                + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
+            let bends = self.length * (load / rod.stiffness.x.min(rod.stiffness.y)).cbrt();
+            let order = 2.0 * stages as f64;
+            let cells = (0.7 * bends).max(turn).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
+            cells.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS) as usize
+        };
+        if turn >= MAX_CELL_TURN * cells as f64 {
+            let name = "cells";
+            let allowed = "as many that the rest curvature turns less than 3 rad in each";
+            return Err(Error::NotAllowed { name, value: cells as f64, allowed });
+        }
+        Ok(Mesh::uniform(self.length, cells, stages, self.rest_curvature))
+    }
+
+    /// The longest internal step: as given, or a part of the shortest time in which gravity or stiffness move the whole rod.
+    fn longest_step(&self, rod: &Rod, tolerance: f64) -> f64 {
+        if self.step > 0.0 {
+            return self.step;
+        }
+        let mass = rod.mass_per_length * self.length;
+        let swing = (self.length / self.gravity.norm()).sqrt();
+        let vibration = (mass * self.length.powi(3) / rod.stiffness.x.max(rod.stiffness.y)).sqrt();
+        // measured on a rope and on a wire: 1/80 of that time gives 3e-4 to 7e-4 of the length
+        swing.min(vibration) / 80.0 * (tolerance / 1e-3).sqrt()
+    }
+}
+
+/// Most cells a host may ask for.
+const MAX_CELLS: f64 = 100_000.0;
+/// Most cells chosen here.
+const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
+/// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the motion.
+const MAX_CELL_TURN: f64 = 3.0;
+
+impl Inputs {
+    /// Refuses what is not a number, and an orientation that is none.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] names the first input.
+    pub fn validate(&self) -> Result<(), Error> {
+        const POSITION: [&str; 3] = ["base.position[1]", "base.position[2]", "base.position[3]"];
+        const VELOCITY: [&str; 3] = ["base.velocity[1]", "base.velocity[2]", "base.velocity[3]"];
+        const ANGULAR: [&str; 3] = ["base.angular_velocity[1]", "base.angular_velocity[2]", "base.angular_velocity[3]"];
+        const FORCE: [&str; 3] = ["tip.force[1]", "tip.force[2]", "tip.force[3]"];
+        const MOMENT: [&str; 3] = ["tip.moment[1]", "tip.moment[2]", "tip.moment[3]"];
+        const ORIENTATION: [&str; 4] =
+            ["base.orientation[1]", "base.orientation[2]", "base.orientation[3]", "base.orientation[4]"];
+        let vectors = [
+            (POSITION, &self.base_position),
+            (VELOCITY, &self.base_velocity),
+            (ANGULAR, &self.base_angular_velocity),
+            (FORCE, &self.tip_force),
+            (MOMENT, &self.tip_moment),
+        ];
+        let components = vectors.iter().flat_map(|(names, vector)| names.iter().zip(vector.iter()));
+        for (name, value) in components.chain(ORIENTATION.iter().zip(self.base_orientation.iter())) {
+            if !value.is_finite() {
+                return Err(Error::NotAllowed { name, value: *value, allowed: "finite" });
+            }
+        }
+        let norm = self.base_orientation.norm();
+        if !(norm > 1e-100 && norm.is_finite()) {
+            return Err(Error::NotAllowed {
+                name: "base.orientation",
+                value: norm,
+                allowed: "a quaternion of norm > 0",
+            });
+        }
+        Ok(())
+    }
+
+    fn sample(&self) -> Sample {
+        Sample {
+            position: self.base_position,
+            rotation: so3::from_quaternion(&self.base_orientation.normalize()),
+            velocity: self.base_velocity,
+            angular_velocity: self.base_angular_velocity,
+        }
+    }
 }
 
 impl Unit {
     /// Starts a rod. `tolerance` is that of the experiment, if the host gave one.
     ///
     /// # Errors
-    /// [`Error`] names the parameter or input that is not allowed.
+    /// [`Error`] names the parameter or input that is not allowed, or says why there is no start.
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
-        let _ = (inputs, tolerance);
-        if !(parameters.length > 0.0) {
-            return Err(Error::NotAllowed { name: "length", value: parameters.length, allowed: "finite and > 0" });
+        parameters.validate()?;
+        inputs.validate()?;
+        let given = |value: &f64| value.is_finite() && *value > 0.0;
+        let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
+        let rod = parameters.rod();
+        let mesh = parameters.mesh(&rod, inputs, tolerance)?;
+        let step = parameters.longest_step(&rod, tolerance);
+        let path = Path::new(
+            match parameters.base_motion {
+                0 => Given::PoseAndTwist,
+                1 => Given::Pose,
+                _ => Given::Twist,
+            },
+            inputs.sample(),
+        );
+        let boundary = Boundary {
+            base: *path.base(),
+            tip_force: inputs.tip_force,
+            tip_moment: inputs.tip_moment,
+            gravity: parameters.gravity,
+        };
+
+        let state = State::at_rest_shape(&mesh, &boundary.base);
+        let mut stepper = Stepper::new(mesh, rod, state);
+        if parameters.start_in_equilibrium {
+            stepper.equilibrium(&boundary).map_err(Error::NoEquilibrium)?;
+            let lowest = modes::modes(&mut stepper, &boundary, 1).map_err(Error::NoEquilibrium)?;
+            if let Some(mode) = lowest.iter().find(|mode| mode.omega_squared <= 0.0) {
+                return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
+            }
         }
-        Ok(Self { outputs: Outputs::default() })
+        stepper.start(&boundary).map_err(Error::NoStart)?;
+
+        let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
+        let mut unit = Self {
+            scheme: Scheme::from_spectral_radius(parameters.spectral_radius),
+            step,
+            gravity: parameters.gravity,
+            path,
+            energy,
+            backup: stepper.state.clone(),
+            stations: stations(&stepper.mesh),
+            warned: false,
+            counts: Counts::default(),
+            outputs: Outputs::default(),
+            stepper,
+        };
+        unit.read_out();
+        Ok(unit)
     }
 
     /// Advances by one communication step of `step_size` s, from the inputs at its start.
@@ -238,18 +511,148 @@ impl Unit {
     /// # Errors
     /// [`Error`]; the unit is then exactly as before and the call may be repeated.
     pub fn advance(&mut self, inputs: &Inputs, step_size: f64) -> Result<Option<Warning>, Error> {
-        self.outputs.tip_position += inputs.base_velocity * step_size;
-        self.outputs.steps += 1;
-        Ok(None)
+        inputs.validate()?;
+        if !(step_size > 0.0 && step_size.is_finite()) {
+            return Err(Error::NotAllowed {
+                name: "communication step size",
+                value: step_size,
+                allowed: "finite and > 0",
+            });
+        }
+        let segment = self.path.segment(&inputs.sample(), step_size);
+        self.backup.copy_from(&self.stepper.state);
+        let (energy, counts) = (self.energy, self.counts);
+        // a host's round-off does not cost a step
+        let steps = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
+        let dt = step_size / steps;
+        let mut i = 0.0;
+        while i < steps {
+            if let Err(error) = self.internal_step(&segment, inputs, i * dt, dt, 0) {
+                self.stepper.state.copy_from(&self.backup);
+                (self.energy, self.counts) = (energy, counts);
+                return Err(error);
+            }
+            i += 1.0;
+        }
+        let warning = self.disagreement(&segment, step_size);
+        self.path = segment.into_path();
+        self.read_out();
+        Ok(warning)
+    }
+
+    /// One internal step from `time`, or its two halves.
+    fn internal_step(
+        &mut self,
+        segment: &Segment,
+        inputs: &Inputs,
+        time: f64,
+        dt: f64,
+        halvings: u32,
+    ) -> Result<(), Error> {
+        let boundary = Boundary {
+            base: segment.at(time + dt),
+            tip_force: inputs.tip_force,
+            tip_moment: inputs.tip_moment,
+            gravity: self.gravity,
+        };
+        match self.stepper.advance(&boundary, self.scheme, dt) {
+            Ok(report) => {
+                self.counts.steps = self.counts.steps.saturating_add(1);
+                self.counts.iterations = self.counts.iterations.saturating_add(report.iterations as i32);
+                let Stepper { mesh, rod, state, .. } = &self.stepper;
+                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
+                Ok(())
+            }
+            Err(cause) if halvings == MAX_HALVINGS => Err(Error::Diverged { time, step: dt, cause }),
+            Err(cause) => {
+                self.counts.retries = self.counts.retries.saturating_add(1);
+                self.counts.iterations = self.counts.iterations.saturating_add(cause.iterations as i32);
+                self.internal_step(segment, inputs, time, 0.5 * dt, halvings + 1)?;
+                self.internal_step(segment, inputs, time + 0.5 * dt, 0.5 * dt, halvings + 1)
+            }
+        }
+    }
+
+    fn disagreement(&mut self, segment: &Segment, step_size: f64) -> Option<Warning> {
+        let base = self.path.base();
+        let length = self.stepper.mesh.length();
+        let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * base.velocity.norm();
+        let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * base.angular_velocity.norm();
+        if self.warned || !(far || turned) {
+            return None;
+        }
+        self.warned = true;
+        Some(if far {
+            let names = ["base.position", "base.velocity"];
+            Warning::PoseAndTwistDisagree { names, distance: segment.distance, unit: "m" }
+        } else {
+            let names = ["base.orientation", "base.angular_velocity"];
+            Warning::PoseAndTwistDisagree { names, distance: segment.angle, unit: "rad" }
+        })
     }
 
     /// Sets gravity from the next step on.
     pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
-        let _ = gravity;
+        self.gravity = gravity;
     }
 
     /// The outputs at the present communication point.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
+
+    /// The rod itself.
+    pub fn stepper(&self) -> &Stepper {
+        &self.stepper
+    }
+
+    /// The `count` lowest modes of small vibration about the present state, which is to be an equilibrium.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`] if its stiffness is singular.
+    pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
+        let boundary = Boundary {
+            base: *self.path.base(),
+            tip_force: Vector3::zeros(),
+            tip_moment: Vector3::zeros(),
+            gravity: self.gravity,
+        };
+        modes::modes(&mut self.stepper, &boundary, count).map_err(Error::NoEquilibrium)
+    }
+
+    fn read_out(&mut self) {
+        let Stepper { mesh, rod, state, .. } = &self.stepper;
+        let (tip, memory) = (state.tip(), state.tip_memory());
+        let angular_velocity = tip.rotation * memory.spin.velocity.value;
+        let Counts { steps, iterations, retries } = self.counts;
+        self.outputs = Outputs {
+            tip_position: tip.position,
+            tip_orientation: so3::quaternion(&tip.rotation),
+            tip_velocity: memory.travel.velocity.value,
+            tip_angular_velocity: angular_velocity,
+            base_reaction_force: state.nodes[0].force,
+            base_reaction_moment: state.nodes[0].moment,
+            stations: self.stations.map(|at| state.position_within(mesh, rod, at.cell, at.theta)),
+            energy: self.energy,
+            steps,
+            iterations,
+            retries,
+            cells: mesh.cells.len() as i32,
+        };
+    }
+}
+
+/// Points at equal arc lengths.
+fn stations(mesh: &Mesh) -> [Station; STATIONS] {
+    let mut stations = [Station::default(); STATIONS];
+    let (mut cell, mut start) = (0, 0.0);
+    for (i, station) in stations.iter_mut().enumerate() {
+        let s = mesh.length() * i as f64 / (STATIONS - 1) as f64;
+        while cell + 1 < mesh.cells.len() && s > start + mesh.cells[cell].length {
+            start += mesh.cells[cell].length;
+            cell += 1;
+        }
+        *station = Station { cell, theta: ((s - start) / mesh.cells[cell].length).min(1.0) };
+    }
+    stations
 }
