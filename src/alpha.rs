@@ -16,7 +16,7 @@
 //! ẋᵢ = v + (½−γ) Δt a + e Δt² ȧ,  e = 1/6 − γ(1−γ)          vᵢ = v + (e + αγ − β/2) Δt² ȧ
 //! ```
 //!
-//! up to O(Δt³). A start, and a change of Δt, put the rates there ([`Scheme::rebased`]); otherwise the acceleration of
+//! up to O(Δt³). A start, and a change of Δt or of the scheme, put the rates there ([`Scheme::started`], [`Scheme::rebased`]); otherwise the acceleration of
 //! whatever is too stiff to follow its own dynamics, and with it the reaction, begins every such step with an error O(Δt)
 //! that decays slowly, and never at ρ∞ = 1.
 
@@ -109,22 +109,30 @@ impl Scheme {
         [first, second, second + alpha * gamma - 0.5 * beta]
     }
 
-    /// The history after steps of `dt` with the scheme `before`, for steps of `new` with this one: the rates move with their
-    /// shift. `dt` = 0 is the start of a motion, where they are the true ones.
-    pub fn rebased(&self, old: &Motion, before: &Self, dt: f64, new: f64) -> Motion {
-        let (from, to) = (before.shift(), self.shift());
-        let first = to[0] * new - from[0] * dt;
-        let second = to[1] * new * new - from[1] * dt * dt;
-        let value = to[2] * new * new - from[2] * dt * dt;
-        let Motion { velocity, acceleration, jerk } = *old;
+    /// The true rates at the start of a motion as the history for steps of `dt`.
+    pub fn started(&self, motion: &Motion, dt: f64) -> Motion {
+        let [first, second, value] = self.shift();
+        let Motion { velocity, acceleration, jerk } = *motion;
+        let (by, by2) = (acceleration.value * (first * dt), dt * dt);
         Motion {
             velocity: Rate {
-                auxiliary: velocity.auxiliary + acceleration.value * first + jerk * second,
-                value: velocity.value + jerk * value,
+                auxiliary: velocity.value + by + jerk * (second * by2),
+                value: velocity.value + jerk * (value * by2),
             },
-            acceleration: Rate { auxiliary: acceleration.auxiliary + jerk * first, ..acceleration },
+            acceleration: Rate { auxiliary: acceleration.value + jerk * (first * dt), ..acceleration },
             jerk,
         }
+    }
+
+    /// The history after steps of `dt` with the scheme `before`, for steps of `new` with this one: the auxiliary rates move with
+    /// their shift, in first order. (In second order, rates of what is too stiff to be followed would feed on themselves where
+    /// the step changes often.)
+    pub fn rebased(&self, motion: &Motion, before: &Self, dt: f64, new: f64) -> Motion {
+        let first = self.shift()[0] * new - before.shift()[0] * dt;
+        let mut rebased = *motion;
+        rebased.velocity.auxiliary += motion.acceleration.value * first;
+        rebased.acceleration.auxiliary += motion.jerk * first;
+        rebased
     }
 }
 
@@ -164,7 +172,7 @@ mod tests {
             let s = at(1.0);
             let e = Vector3::x();
             let start = Motion::starting(e * s[0], e * s[1], e * s[2]);
-            let mut motion = scheme.rebased(&start, &scheme, 0.0, dt);
+            let mut motion = scheme.started(&start, dt);
             let mut worst = 0.0f64;
             for i in 0..5 {
                 let t = 1.0 + i as f64 * dt;

