@@ -62,6 +62,11 @@ impl Scheme {
         Self { alpha: (3.0 * rho - 1.0) / (2.0 * rho + 2.0), beta: rho / (1.0 + rho), gamma: 1.0 / (1.0 + rho) }
     }
 
+    /// Whether α − β + γ = ½, up to rounding.
+    pub fn is_second_order(&self) -> bool {
+        (self.alpha - self.beta + self.gamma - 0.5).abs() < 1e-12
+    }
+
     /// ∂v/∂x at tᵢ, in 1/s; its square is ∂a/∂x.
     pub fn rate_weight(&self, dt: f64) -> f64 {
         (1.0 - self.alpha) / ((1.0 - self.beta) * self.gamma * dt)

@@ -170,7 +170,8 @@ impl Stepper {
         };
         let mut lost = 0;
         if resolved {
-            let scheme = if on_floor && !changes_less(SMOOTH) { floor } else { scheme };
+            let unsmooth = on_floor && scheme.is_second_order() && !changes_less(SMOOTH);
+            let scheme = if unsmooth { floor } else { scheme };
             match self.step(boundary, scheme, dt, Row::Rotations) {
                 Ok(report) => return Ok(report),
                 Err(diverged) => lost = diverged.iterations,
@@ -188,7 +189,8 @@ impl Stepper {
     /// [`Diverged`]; the state is as before.
     pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
         self.old.copy_from(&self.state);
-        if (scheme, dt) != (self.state.scheme, self.state.dt) && scheme != Scheme::BACKWARD_EULER {
+        // what is first order anyway is left as it is: α + γ = 1 and β = 0 then is implicit Euler to rounding
+        if (scheme, dt) != (self.state.scheme, self.state.dt) && scheme.is_second_order() {
             let State { dt: before, scheme: other, .. } = &self.state;
             let rebased = |motion: &Motion| match *before {
                 0.0 => scheme.started(motion, dt),

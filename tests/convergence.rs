@@ -100,8 +100,8 @@ type Record = Vec<[Vec3; 4]>;
 
 const DURATION: f64 = 0.6;
 
-fn run(scene: Scene, scheme: Scheme, steps: usize, mesh: Mesh, samples: usize) -> Record {
-    let rod = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+fn run(scene: Scene, scheme: Scheme, steps: usize, mesh: Mesh, samples: usize, modulus: f64) -> Record {
+    let rod = Rod::circular(5e-3, modulus, modulus / 3.0, 1100.0);
     let state = State::at_rest_shape(&mesh, &scene.boundary(0.0).base);
     let mut stepper = Stepper::new(mesh, rod, state);
     stepper.start(&scene.boundary(0.0)).unwrap();
@@ -114,8 +114,7 @@ fn run(scene: Scene, scheme: Scheme, steps: usize, mesh: Mesh, samples: usize) -
         t += h;
         let report = stepper.advance(&scene.boundary(t), scheme, h).unwrap();
         assert!(report.iterations <= 7, "{scene:?}: {report:?}");
-        let wanted = if scheme == Scheme::BACKWARD_EULER { Row::Rotations } else { stepper.state.row };
-        assert_eq!(wanted, Row::Rotations, "{scene:?}: a step at {t} did not resolve the motion");
+        assert_eq!(stepper.state.row, Row::Rotations, "{scene:?}: a step at {t} did not resolve the motion");
         if (i + 1) % (steps / samples) == 0 {
             let (tip, base) = (stepper.state.tip(), &stepper.state.nodes[0]);
             record.push([tip.position, stepper.state.tip_memory().travel.velocity.value, base.force, base.moment]);
@@ -142,11 +141,41 @@ fn slope(sizes: &[f64], errors: &[f64]) -> f64 {
 fn orders_in_time(scene: Scene, scheme: Scheme, steps: &[usize]) -> [f64; 4] {
     let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
     let samples = steps[0] / 4;
-    let reference = run(scene, scheme, steps[steps.len() - 1] * 8, mesh(), samples);
+    let reference = run(scene, scheme, steps[steps.len() - 1] * 8, mesh(), samples, 5e6);
     let errors: Vec<[f64; 4]> =
-        steps.iter().map(|&n| distance(&run(scene, scheme, n, mesh(), samples), &reference)).collect();
+        steps.iter().map(|&n| distance(&run(scene, scheme, n, mesh(), samples, 5e6), &reference)).collect();
     let sizes: Vec<f64> = steps.iter().map(|&n| 1.0 / n as f64).collect();
     std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
+}
+
+fn orders_in_space(scene: Scene, stages: usize, cells: &[usize]) -> [f64; 4] {
+    let (scheme, steps, samples) = (Scheme::from_spectral_radius(0.5), 120, 60);
+    let mesh = |cells, stages| Mesh::uniform(1.0, cells, stages, Vec3::zeros());
+    let reference = run(scene, scheme, steps, mesh(24, 4), samples, 5e7);
+    let errors: Vec<[f64; 4]> = cells
+        .iter()
+        .map(|&n| distance(&run(scene, scheme, steps, mesh(n, stages), samples, 5e7), &reference))
+        .collect();
+    let sizes: Vec<f64> = cells.iter().map(|&n| 1.0 / n as f64).collect();
+    std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
+}
+
+/// Names of the quantities of a record.
+const QUANTITIES: [&str; 4] = ["tip position", "tip velocity", "base force", "base moment"];
+
+#[test]
+fn order_2s_in_space() {
+    for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
+        // fine enough for the layer (EI Δt²/ρA)^(1/4) = 4 cm that a step forms at the clamp, coarse enough to stay above rounding
+        let meshes: [&[usize]; 3] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20]];
+        for (stages, cells) in (1..).zip(meshes) {
+            let orders = orders_in_space(scene, stages, cells);
+            for (order, quantity) in orders.iter().zip(QUANTITIES) {
+                let expected = 2.0 * f64::from(stages as u32);
+                assert!((order - expected).abs() < 0.2, "{scene:?}, {stages} stages, {quantity}: order {order:.2}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -154,7 +183,26 @@ fn second_order_in_time() {
     for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
         for radius in [0.0, 0.5, 1.0] {
             let orders = orders_in_time(scene, Scheme::from_spectral_radius(radius), &[240, 360, 480, 720]);
-            println!("{scene:?} radius {radius}: {orders:.3?}");
+            for (order, (quantity, bound)) in orders.iter().zip(QUANTITIES.iter().zip([0.1, 0.1, 0.2, 0.2])) {
+                // at radius 1 a rounded or unsmooth start is never damped: no order is promised for the reaction
+                let promised = radius < 1.0 || quantity.starts_with("tip");
+                assert!(!promised || (order - 2.0).abs() < bound, "{scene:?}, radius {radius}, {quantity}: {order:.2}");
+            }
         }
     }
+}
+
+#[test]
+fn the_parameters_of_the_papers_examples_are_first_order_and_implicit_euler() {
+    let printed = Scheme { alpha: 0.3, beta: 0.0, gamma: 0.7 };
+    let orders = orders_in_time(Scene::Pulse, printed, &[480, 720, 960]);
+    for (order, quantity) in orders.iter().zip(QUANTITIES) {
+        // the reference of eight times as many steps has an eighth of the error: slopes up to 1.15
+        assert!((0.85..1.2).contains(order), "{quantity}: {order:.2}");
+    }
+    let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
+    let euler = run(Scene::Pulse, Scheme::BACKWARD_EULER, 240, mesh(), 60, 5e6);
+    let difference = distance(&run(Scene::Pulse, printed, 240, mesh(), 60, 5e6), &euler);
+    // Newton's tolerance of 1e-8 leaves 1e-13 and less after its last quadratic step; 240 steps of it
+    assert!(difference.iter().all(|d| *d < 1e-10), "{difference:?}");
 }
