@@ -2,3 +2,6 @@
 #![deny(unsafe_code)]
 
 pub mod unit;
+
+pub mod fmi2;
+pub mod package;
