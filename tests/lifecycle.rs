@@ -27,8 +27,16 @@ enum State {
 
 use State::{Initialization, Instantiated, StepComplete, Terminated};
 
+/// What is tested here is the interface: a coarse rod is soon computed, even by a debug build.
+fn coarse(fmu: &Fmu, slave: &Slave) {
+    for (name, value) in [("cells", 3.0), ("stages", 1.0), ("step", 0.02)] {
+        set(fmu, slave, name, value).unwrap();
+    }
+}
+
 fn slave(fmu: &Fmu, state: State) -> Slave<'_> {
     let slave = fmu.instantiate("rod", false).unwrap();
+    coarse(fmu, &slave);
     if state == Instantiated {
         return slave;
     }
@@ -89,6 +97,7 @@ fn snapshot(fmu: &Fmu, slave: &Slave) -> Vec<u64> {
 }
 
 fn run(fmu: &Fmu, slave: &Slave, steps: i32) -> Vec<Vec<u64>> {
+    coarse(fmu, slave);
     slave.setup_experiment(0.0, None, None).unwrap();
     slave.enter_initialization_mode().unwrap();
     slave.exit_initialization_mode().unwrap();
