@@ -12,3 +12,6 @@ pub mod stepper;
 pub mod modes;
 pub mod path;
 pub mod unit;
+
+pub mod fmi2;
+pub mod package;

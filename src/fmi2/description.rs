@@ -1,0 +1,261 @@
+//! The table of variables as `modelDescription.xml`.
+//!
+//! The GUID is a fingerprint of the text without it, and the library computes it from the table it was built with: a
+//! description and a library that do not belong together cannot be instantiated.
+
+use super::variables::{self, Kind, Row, Slot, UNITS, Variable};
+use crate::unit::{Inputs, Parameters};
+use quick_xml::Writer;
+use quick_xml::events::{BytesDecl, Event};
+use quick_xml::writer::ElementWriter;
+use std::io;
+
+/// Name of the library in the archive.
+pub const MODEL_IDENTIFIER: &str = "CosseratRod";
+
+/// Where in the archive the library of the platform this was compiled for lies, with forward slashes.
+pub fn binary() -> String {
+    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+    let short = match os {
+        "windows" => "win",
+        "macos" => "darwin",
+        other => other,
+    };
+    // The names from before revision 2.0.4 of the standard are those of the two Intel architectures.
+    let platform = match arch {
+        "x86_64" => format!("{short}64"),
+        "x86" => format!("{short}32"),
+        other => format!("{other}-{short}"),
+    };
+    format!("binaries/{platform}/{MODEL_IDENTIFIER}{}", std::env::consts::DLL_SUFFIX)
+}
+
+/// End of the default experiment, s; it starts at 0.
+pub const STOP_TIME: f64 = 2.0;
+
+/// Communication step of the default experiment, s. Some importers coarsen the step until there are no more than 1000.
+pub const STEP_SIZE: f64 = 0.01;
+
+/// Tolerance of the default experiment.
+pub const TOLERANCE: f64 = 1e-3;
+
+/// Log categories with their meaning.
+pub const LOG_CATEGORIES: [(&str, &str); 7] = [
+    ("logEvents", "start and end of a run"),
+    ("logNonlinearSystems", "internal steps that had to be tried again"),
+    ("logStatusWarning", "lines of calls that answer fmi2Warning"),
+    ("logStatusDiscard", "lines of calls that answer fmi2Discard"),
+    ("logStatusError", "lines of calls that answer fmi2Error"),
+    ("logStatusFatal", "lines of calls that answer fmi2Fatal"),
+    (ALL, "all of them"),
+];
+
+/// The category that stands for all others.
+pub const ALL: &str = "logAll";
+
+/// The whole text.
+pub fn xml() -> String {
+    render(&guid())
+}
+
+/// The GUID, in braces.
+pub fn guid() -> String {
+    let [a, b, c, d, e] = {
+        let hash = format!("{:032x}", fingerprint(render("").as_bytes()));
+        [0..8, 8..12, 12..16, 16..20, 20..32].map(|range| hash[range].to_owned())
+    };
+    format!("{{{a}-{b}-{c}-{d}-{e}}}")
+}
+
+/// FNV-1a, 128 bits: tells descriptions apart, protects from nobody.
+fn fingerprint(text: &[u8]) -> u128 {
+    const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+    text.iter().fold(OFFSET, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
+}
+
+fn render(guid: &str) -> String {
+    let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
+    let written = document(&mut writer, guid);
+    debug_assert!(written.is_ok(), "memory takes every write");
+    String::from_utf8_lossy(&writer.into_inner()).into_owned() + "\n"
+}
+
+type Xml = Writer<Vec<u8>>;
+
+fn document(xml: &mut Xml, guid: &str) -> io::Result<()> {
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+    xml.create_element("fmiModelDescription")
+        .with_attributes([
+            ("fmiVersion", "2.0"),
+            ("modelName", MODEL_IDENTIFIER),
+            ("guid", guid),
+            ("description", env!("CARGO_PKG_DESCRIPTION")),
+            ("version", env!("CARGO_PKG_VERSION")),
+            ("license", env!("CARGO_PKG_LICENSE")),
+            ("generationTool", concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"))),
+            ("variableNamingConvention", "structured"),
+        ])
+        .write_inner_content(|xml| {
+            let variables = variables::all();
+            co_simulation(xml)?;
+            units(xml)?;
+            log_categories(xml)?;
+            default_experiment(xml)?;
+            xml.create_element("ModelVariables").write_inner_content(|xml| {
+                variables.iter().enumerate().try_for_each(|(reference, variable)| scalar(xml, reference, variable))
+            })?;
+            structure(xml, &variables)
+        })?;
+    Ok(())
+}
+
+fn co_simulation(xml: &mut Xml) -> io::Result<()> {
+    xml.create_element("CoSimulation")
+        .with_attributes([
+            ("modelIdentifier", MODEL_IDENTIFIER),
+            ("needsExecutionTool", "false"),
+            ("canHandleVariableCommunicationStepSize", "true"),
+            ("canInterpolateInputs", "false"),
+            ("maxOutputDerivativeOrder", "0"),
+            ("canRunAsynchronuously", "false"),
+            ("canBeInstantiatedOnlyOncePerProcess", "false"),
+            ("canNotUseMemoryManagementFunctions", "true"),
+            ("canGetAndSetFMUstate", "false"),
+            ("canSerializeFMUstate", "false"),
+            ("providesDirectionalDerivative", "false"),
+        ])
+        .write_empty()?;
+    Ok(())
+}
+
+fn units(xml: &mut Xml) -> io::Result<()> {
+    xml.create_element("UnitDefinitions").write_inner_content(|xml| {
+        UNITS.iter().try_for_each(|(name, exponents)| {
+            xml.create_element("Unit").with_attribute(("name", *name)).write_inner_content(|xml| {
+                let base = ["kg", "m", "s", "rad"].into_iter().zip(exponents);
+                base.filter(|(_, exponent)| **exponent != 0)
+                    .fold(xml.create_element("BaseUnit"), |element, (symbol, exponent)| {
+                        number(element, symbol, exponent)
+                    })
+                    .write_empty()?;
+                Ok(())
+            })?;
+            Ok(())
+        })
+    })?;
+    Ok(())
+}
+
+fn log_categories(xml: &mut Xml) -> io::Result<()> {
+    xml.create_element("LogCategories").write_inner_content(|xml| {
+        LOG_CATEGORIES.iter().try_for_each(|(name, description)| {
+            xml.create_element("Category")
+                .with_attributes([("name", *name), ("description", *description)])
+                .write_empty()?;
+            Ok(())
+        })
+    })?;
+    Ok(())
+}
+
+fn default_experiment(xml: &mut Xml) -> io::Result<()> {
+    let attributes = [("startTime", 0.0), ("stopTime", STOP_TIME), ("tolerance", TOLERANCE), ("stepSize", STEP_SIZE)];
+    attributes
+        .into_iter()
+        .fold(xml.create_element("DefaultExperiment"), |element, (name, value)| number(element, name, value))
+        .write_empty()?;
+    Ok(())
+}
+
+/// Numbers are written with as many digits as it takes to read the same number back.
+fn number<'a>(element: ElementWriter<'a, Vec<u8>>, name: &str, value: impl ToString) -> ElementWriter<'a, Vec<u8>> {
+    element.with_attribute((name, value.to_string().as_str()))
+}
+
+fn scalar(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()> {
+    let (causality, variability, initial) = triple(variable.row);
+    let element = xml.create_element("ScalarVariable").with_attributes([
+        ("name", variable.to_string().as_str()),
+        ("valueReference", reference.to_string().as_str()),
+        ("description", variable.description().as_str()),
+        ("causality", causality),
+        ("variability", variability),
+    ]);
+    let element = match initial {
+        Some(initial) => element.with_attribute(("initial", initial)),
+        None => element,
+    };
+    element.write_inner_content(|xml| {
+        let kind = match variable.kind() {
+            Kind::Real => "Real",
+            Kind::Integer => "Integer",
+            Kind::Boolean => "Boolean",
+            Kind::String => "String",
+        };
+        let mut element = xml.create_element(kind);
+        if !variable.row.unit.is_empty() {
+            element = element.with_attribute(("unit", variable.row.unit));
+        }
+        if variable.kind() != Kind::Boolean {
+            for (name, bound) in [("min", variable.allowed().min()), ("max", variable.allowed().max())] {
+                element = match bound {
+                    Some(bound) => number(element, name, bound),
+                    None => element,
+                };
+            }
+        }
+        if let Some(start) = variable.given(&mut Parameters::default(), &mut Inputs::default()) {
+            element = match variable.kind() {
+                Kind::Boolean => number(element, "start", start != 0.0),
+                _ => number(element, "start", start),
+            };
+        }
+        element.write_empty()?;
+        Ok(())
+    })?;
+    Ok(())
+}
+
+/// Causality, variability and initial, as the standard allows them together.
+fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static str>) {
+    match row.slot {
+        Slot::Parameter(..) | Slot::IntegerParameter(..) | Slot::BooleanParameter(_) => {
+            ("parameter", "fixed", Some("exact"))
+        }
+        Slot::Tunable(..) => ("parameter", "tunable", Some("exact")),
+        Slot::Input(_) => ("input", "continuous", None),
+        Slot::Output(..) => ("output", "continuous", Some("calculated")),
+        Slot::IntegerOutput(..) => ("output", "discrete", Some("calculated")),
+    }
+}
+
+/// The dependencies are argued at [`variables::Initially`]; indices are places among the variables, from 1.
+fn structure(xml: &mut Xml, variables: &[Variable]) -> io::Result<()> {
+    let place = |index: usize| (index + 1).to_string();
+    let outputs = || variables.iter().enumerate().filter(|(_, variable)| variable.is_output());
+    xml.create_element("ModelStructure").write_inner_content(|xml| {
+        xml.create_element("Outputs").write_inner_content(|xml| {
+            outputs().try_for_each(|(index, _)| {
+                xml.create_element("Unknown")
+                    .with_attributes([("index", place(index).as_str()), ("dependencies", "")])
+                    .write_empty()?;
+                Ok(())
+            })
+        })?;
+        xml.create_element("InitialUnknowns").write_inner_content(|xml| {
+            outputs().try_for_each(|(index, unknown)| {
+                let known: Vec<String> = (variables.iter().enumerate())
+                    .filter(|(_, known)| !known.is_output() && unknown.depends_initially_on(known))
+                    .map(|(index, _)| place(index))
+                    .collect();
+                xml.create_element("Unknown")
+                    .with_attributes([("index", place(index).as_str()), ("dependencies", known.join(" ").as_str())])
+                    .write_empty()?;
+                Ok(())
+            })
+        })?;
+        Ok(())
+    })?;
+    Ok(())
+}

@@ -1,0 +1,603 @@
+//! The other side of the C boundary: loads an unpacked unit and drives it through its C functions only, as a master
+//! does that knows nothing but the model description. For the demo, the tests and the benchmarks.
+//!
+//! `unsafe` here is what it is for every host: the library is trusted to be what it claims. It shares the C types with
+//! `abi`, as two programs share the headers, and nothing else.
+#![allow(unsafe_code, non_snake_case)]
+
+pub use super::abi::{
+    CO_SIMULATION, fmi2Boolean, fmi2Byte, fmi2CallbackFunctions, fmi2CallbackLogger, fmi2Component,
+    fmi2ComponentEnvironment, fmi2FMUstate, fmi2Integer, fmi2Real, fmi2Status, fmi2String, fmi2ValueReference,
+};
+use super::description;
+use super::variables::Kind;
+use libloading::Library;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Reader, XmlVersion};
+use std::collections::BTreeMap;
+use std::ffi::{CStr, CString, c_int, c_void};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::{fmt, fs, io, ptr};
+
+/// Takes an instance and nothing else.
+pub type Plain = unsafe extern "C" fn(fmi2Component) -> fmi2Status;
+/// Reads variables.
+pub type Get<T> = unsafe extern "C" fn(fmi2Component, *const fmi2ValueReference, usize, *mut T) -> fmi2Status;
+/// Writes variables.
+pub type Set<T> = unsafe extern "C" fn(fmi2Component, *const fmi2ValueReference, usize, *const T) -> fmi2Status;
+/// Asks for a status.
+pub type Inquire<T> = unsafe extern "C" fn(fmi2Component, c_int, *mut T) -> fmi2Status;
+/// Signature of `fmi2Instantiate`.
+pub type Instantiate = unsafe extern "C" fn(
+    fmi2String,
+    c_int,
+    fmi2String,
+    fmi2String,
+    *const fmi2CallbackFunctions,
+    fmi2Boolean,
+    fmi2Boolean,
+) -> fmi2Component;
+/// Signature of `fmi2SetupExperiment`.
+pub type SetupExperiment =
+    unsafe extern "C" fn(fmi2Component, fmi2Boolean, fmi2Real, fmi2Real, fmi2Boolean, fmi2Real) -> fmi2Status;
+/// Signature of `fmi2GetDirectionalDerivative`.
+pub type GetDirectionalDerivative = unsafe extern "C" fn(
+    fmi2Component,
+    *const fmi2ValueReference,
+    usize,
+    *const fmi2ValueReference,
+    usize,
+    *const fmi2Real,
+    *mut fmi2Real,
+) -> fmi2Status;
+
+/// The 34 functions of co-simulation, under their C names without the prefix.
+#[allow(missing_docs)]
+#[derive(Clone, Copy, Debug)]
+pub struct Functions {
+    pub GetTypesPlatform: unsafe extern "C" fn() -> fmi2String,
+    pub GetVersion: unsafe extern "C" fn() -> fmi2String,
+    pub SetDebugLogging: unsafe extern "C" fn(fmi2Component, fmi2Boolean, usize, *const fmi2String) -> fmi2Status,
+    pub Instantiate: Instantiate,
+    pub FreeInstance: unsafe extern "C" fn(fmi2Component),
+    pub SetupExperiment: SetupExperiment,
+    pub EnterInitializationMode: Plain,
+    pub ExitInitializationMode: Plain,
+    pub Terminate: Plain,
+    pub Reset: Plain,
+    pub GetReal: Get<fmi2Real>,
+    pub GetInteger: Get<fmi2Integer>,
+    pub GetBoolean: Get<fmi2Boolean>,
+    pub GetString: Get<fmi2String>,
+    pub SetReal: Set<fmi2Real>,
+    pub SetInteger: Set<fmi2Integer>,
+    pub SetBoolean: Set<fmi2Boolean>,
+    pub SetString: Set<fmi2String>,
+    pub GetFMUstate: unsafe extern "C" fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status,
+    pub SetFMUstate: unsafe extern "C" fn(fmi2Component, fmi2FMUstate) -> fmi2Status,
+    pub FreeFMUstate: unsafe extern "C" fn(fmi2Component, *mut fmi2FMUstate) -> fmi2Status,
+    pub SerializedFMUstateSize: unsafe extern "C" fn(fmi2Component, fmi2FMUstate, *mut usize) -> fmi2Status,
+    pub SerializeFMUstate: unsafe extern "C" fn(fmi2Component, fmi2FMUstate, *mut fmi2Byte, usize) -> fmi2Status,
+    pub DeSerializeFMUstate:
+        unsafe extern "C" fn(fmi2Component, *const fmi2Byte, usize, *mut fmi2FMUstate) -> fmi2Status,
+    pub GetDirectionalDerivative: GetDirectionalDerivative,
+    pub SetRealInputDerivatives: unsafe extern "C" fn(
+        fmi2Component,
+        *const fmi2ValueReference,
+        usize,
+        *const fmi2Integer,
+        *const fmi2Real,
+    ) -> fmi2Status,
+    pub GetRealOutputDerivatives: unsafe extern "C" fn(
+        fmi2Component,
+        *const fmi2ValueReference,
+        usize,
+        *const fmi2Integer,
+        *mut fmi2Real,
+    ) -> fmi2Status,
+    pub DoStep: unsafe extern "C" fn(fmi2Component, fmi2Real, fmi2Real, fmi2Boolean) -> fmi2Status,
+    pub CancelStep: Plain,
+    pub GetStatus: Inquire<fmi2Status>,
+    pub GetRealStatus: Inquire<fmi2Real>,
+    pub GetIntegerStatus: Inquire<fmi2Integer>,
+    pub GetBooleanStatus: Inquire<fmi2Boolean>,
+    pub GetStringStatus: Inquire<fmi2String>,
+}
+
+impl Functions {
+    fn load(library: &Library) -> Result<Self, Error> {
+        /// # Safety
+        /// The symbol, if it is there, is of type `T`.
+        unsafe fn symbol<T: Copy>(library: &Library, name: &'static str) -> Result<T, Error> {
+            unsafe { library.get::<T>(name) }.map(|found| *found).map_err(|error| Error::Symbol { name, error })
+        }
+        unsafe {
+            Ok(Self {
+                GetTypesPlatform: symbol(library, "fmi2GetTypesPlatform")?,
+                GetVersion: symbol(library, "fmi2GetVersion")?,
+                SetDebugLogging: symbol(library, "fmi2SetDebugLogging")?,
+                Instantiate: symbol(library, "fmi2Instantiate")?,
+                FreeInstance: symbol(library, "fmi2FreeInstance")?,
+                SetupExperiment: symbol(library, "fmi2SetupExperiment")?,
+                EnterInitializationMode: symbol(library, "fmi2EnterInitializationMode")?,
+                ExitInitializationMode: symbol(library, "fmi2ExitInitializationMode")?,
+                Terminate: symbol(library, "fmi2Terminate")?,
+                Reset: symbol(library, "fmi2Reset")?,
+                GetReal: symbol(library, "fmi2GetReal")?,
+                GetInteger: symbol(library, "fmi2GetInteger")?,
+                GetBoolean: symbol(library, "fmi2GetBoolean")?,
+                GetString: symbol(library, "fmi2GetString")?,
+                SetReal: symbol(library, "fmi2SetReal")?,
+                SetInteger: symbol(library, "fmi2SetInteger")?,
+                SetBoolean: symbol(library, "fmi2SetBoolean")?,
+                SetString: symbol(library, "fmi2SetString")?,
+                GetFMUstate: symbol(library, "fmi2GetFMUstate")?,
+                SetFMUstate: symbol(library, "fmi2SetFMUstate")?,
+                FreeFMUstate: symbol(library, "fmi2FreeFMUstate")?,
+                SerializedFMUstateSize: symbol(library, "fmi2SerializedFMUstateSize")?,
+                SerializeFMUstate: symbol(library, "fmi2SerializeFMUstate")?,
+                DeSerializeFMUstate: symbol(library, "fmi2DeSerializeFMUstate")?,
+                GetDirectionalDerivative: symbol(library, "fmi2GetDirectionalDerivative")?,
+                SetRealInputDerivatives: symbol(library, "fmi2SetRealInputDerivatives")?,
+                GetRealOutputDerivatives: symbol(library, "fmi2GetRealOutputDerivatives")?,
+                DoStep: symbol(library, "fmi2DoStep")?,
+                CancelStep: symbol(library, "fmi2CancelStep")?,
+                GetStatus: symbol(library, "fmi2GetStatus")?,
+                GetRealStatus: symbol(library, "fmi2GetRealStatus")?,
+                GetIntegerStatus: symbol(library, "fmi2GetIntegerStatus")?,
+                GetBooleanStatus: symbol(library, "fmi2GetBooleanStatus")?,
+                GetStringStatus: symbol(library, "fmi2GetStringStatus")?,
+            })
+        }
+    }
+}
+
+/// Why a unit cannot be driven.
+#[derive(Debug)]
+pub enum Error {
+    /// The model description cannot be read.
+    Read {
+        /// Of the file.
+        path: PathBuf,
+        /// Why.
+        error: io::Error,
+    },
+    /// The model description is no XML.
+    Xml(quick_xml::Error),
+    /// The library cannot be loaded.
+    Load {
+        /// Of the library.
+        path: PathBuf,
+        /// Why.
+        error: libloading::Error,
+    },
+    /// A function is missing.
+    Symbol {
+        /// Its name.
+        name: &'static str,
+        /// Why.
+        error: libloading::Error,
+    },
+    /// `fmi2Instantiate` gave no instance.
+    NoInstance {
+        /// What it said.
+        log: Vec<Line>,
+    },
+    /// A call was not answered with fmi2OK or fmi2Warning.
+    Refused {
+        /// Name of the function.
+        function: &'static str,
+        /// Its answer.
+        status: fmi2Status,
+        /// What it said.
+        log: Vec<Line>,
+    },
+    /// The model description knows no such variable of this type.
+    UnknownVariable {
+        /// Its name.
+        name: String,
+    },
+    /// As many values as references are needed.
+    Lengths {
+        /// How many references.
+        references: usize,
+        /// How many values.
+        values: usize,
+    },
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lines =
+            |f: &mut fmt::Formatter<'_>, log: &[Line]| log.iter().try_for_each(|line| write!(f, "; {}", line.text));
+        match self {
+            Self::Read { path, error } => write!(f, "{}: {error}", path.display()),
+            Self::Xml(error) => write!(f, "model description: {error}"),
+            Self::Load { path, error } => write!(f, "{}: {error}", path.display()),
+            Self::Symbol { name, error } => write!(f, "{name}: {error}"),
+            Self::NoInstance { log } => {
+                write!(f, "fmi2Instantiate gave no instance")?;
+                lines(f, log)
+            }
+            Self::Refused { function, status, log } => {
+                write!(f, "{function} answered {}", status.0)?;
+                lines(f, log)
+            }
+            Self::UnknownVariable { name } => write!(f, "the model description has no variable {name} of this type"),
+            Self::Lengths { references, values } => write!(f, "{references} value references but {values} values"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Name of the instance.
+    pub instance: String,
+    /// Answer of the call that wrote it.
+    pub status: fmi2Status,
+    /// Log category.
+    pub category: String,
+    /// Text.
+    pub text: String,
+}
+
+/// A variable, as far as a master has to know it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Value reference.
+    pub reference: fmi2ValueReference,
+    /// Type.
+    pub kind: Kind,
+    /// `parameter`, `input` or `output`.
+    pub causality: String,
+    /// `fixed`, `tunable`, `discrete` or `continuous`.
+    pub variability: String,
+    /// Start value as written; empty for outputs.
+    pub start: String,
+    /// Unit, empty if none.
+    pub unit: String,
+}
+
+/// The model description, as far as a master has to know it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Description {
+    /// GUID.
+    pub guid: String,
+    /// End of the default experiment, s.
+    pub stop_time: f64,
+    /// Communication step of the default experiment, s.
+    pub step_size: f64,
+    /// Variables by name.
+    pub variables: BTreeMap<String, Variable>,
+}
+
+impl Description {
+    /// Reads the text of a `modelDescription.xml`.
+    ///
+    /// # Errors
+    /// [`Error::Xml`]
+    pub fn parse(xml: &str) -> Result<Self, Error> {
+        let mut reader = Reader::from_str(xml);
+        let mut description = Self::default();
+        let mut open: Option<(String, Variable)> = None;
+        loop {
+            let element = match reader.read_event().map_err(Error::Xml)? {
+                Event::Start(element) | Event::Empty(element) => element,
+                Event::Eof => return Ok(description),
+                _ => continue,
+            };
+            let get = |name| attribute(&element, name);
+            let number = |name| get(name).map(|text| text.parse().unwrap_or_default());
+            let kind = match element.name().as_ref() {
+                "fmiModelDescription" => {
+                    description.guid = get("guid")?;
+                    continue;
+                }
+                "DefaultExperiment" => {
+                    (description.stop_time, description.step_size) = (number("stopTime")?, number("stepSize")?);
+                    continue;
+                }
+                "ScalarVariable" => {
+                    let variable = Variable {
+                        reference: get("valueReference")?.parse().unwrap_or_default(),
+                        kind: Kind::Real,
+                        causality: get("causality")?,
+                        variability: get("variability")?,
+                        start: String::new(),
+                        unit: String::new(),
+                    };
+                    open = Some((get("name")?, variable));
+                    continue;
+                }
+                "Real" => Kind::Real,
+                "Integer" => Kind::Integer,
+                "Boolean" => Kind::Boolean,
+                "String" => Kind::String,
+                _ => continue,
+            };
+            if let Some((name, variable)) = open.take() {
+                let variable = Variable { kind, start: get("start")?, unit: get("unit")?, ..variable };
+                description.variables.insert(name, variable);
+            }
+        }
+    }
+
+    /// The value reference of a variable of this type.
+    ///
+    /// # Errors
+    /// [`Error::UnknownVariable`]
+    pub fn reference(&self, name: &str, kind: Kind) -> Result<fmi2ValueReference, Error> {
+        let variable = self.variables.get(name).filter(|variable| variable.kind == kind);
+        variable.map(|variable| variable.reference).ok_or_else(|| Error::UnknownVariable { name: name.to_owned() })
+    }
+
+    /// The value references of a Real array, in the order of its elements.
+    ///
+    /// # Errors
+    /// [`Error::UnknownVariable`]
+    pub fn array<const N: usize>(&self, name: &str) -> Result<[fmi2ValueReference; N], Error> {
+        let mut references = [0; N];
+        for (k, reference) in references.iter_mut().enumerate() {
+            *reference = self.reference(&format!("{name}[{}]", k + 1), Kind::Real)?;
+        }
+        Ok(references)
+    }
+}
+
+fn attribute(element: &BytesStart<'_>, name: &str) -> Result<String, Error> {
+    let found = element.try_get_attribute(name).map_err(|error| Error::Xml(error.into()))?;
+    let value = found.map(|found| found.normalized_value(XmlVersion::Implicit1_0).map(|value| value.into_owned()));
+    Ok(value.transpose().map_err(Error::Xml)?.unwrap_or_default())
+}
+
+/// A loaded unit.
+#[derive(Debug)]
+pub struct Fmu {
+    /// What it says of itself.
+    pub description: Description,
+    functions: Functions,
+    resources: String,
+    /// Last, for it must outlive the functions.
+    _library: Library,
+}
+
+impl Fmu {
+    /// Loads the unit that was unpacked into `directory`.
+    ///
+    /// # Errors
+    /// What of it cannot be read or loaded.
+    pub fn open(directory: &Path) -> Result<Self, Error> {
+        let path = directory.join("modelDescription.xml");
+        let xml = fs::read_to_string(&path).map_err(|error| Error::Read { path, error })?;
+        let resources = format!("file://{}/resources", directory.display());
+        Self::load(&directory.join(description::binary()), Description::parse(&xml)?, resources)
+    }
+
+    /// Loads a library that has not been packaged, with the description this crate renders.
+    ///
+    /// # Errors
+    /// What of it cannot be loaded.
+    pub fn from_library(path: &Path) -> Result<Self, Error> {
+        Self::load(path, Description::parse(&description::xml())?, String::new())
+    }
+
+    fn load(path: &Path, description: Description, resources: String) -> Result<Self, Error> {
+        // Loading runs whatever the library wants to run then; ours has no initialisers.
+        let library = unsafe { Library::new(path) }.map_err(|error| Error::Load { path: path.to_owned(), error })?;
+        Ok(Self { description, functions: Functions::load(&library)?, resources, _library: library })
+    }
+
+    /// The bare functions. They must not be called after `self` is gone.
+    pub fn functions(&self) -> &Functions {
+        &self.functions
+    }
+
+    /// A new instance; `debug` as `loggingOn`.
+    ///
+    /// # Errors
+    /// [`Error::NoInstance`]
+    pub fn instantiate(&self, name: &str, debug: bool) -> Result<Slave<'_>, Error> {
+        self.instantiate_as(name, &self.description.guid, debug)
+    }
+
+    /// The same with a GUID that may be wrong.
+    ///
+    /// # Errors
+    /// [`Error::NoInstance`]
+    pub fn instantiate_as(&self, name: &str, guid: &str, debug: bool) -> Result<Slave<'_>, Error> {
+        let log = Log::default();
+        // On the stack, as the standard lends it for the time of the call only.
+        let callbacks = log.callbacks();
+        let [name, guid, resources] = [name, guid, &self.resources].map(|text| CString::new(text).unwrap_or_default());
+        let component = unsafe {
+            (self.functions.Instantiate)(
+                name.as_ptr(),
+                CO_SIMULATION,
+                guid.as_ptr(),
+                resources.as_ptr(),
+                &callbacks,
+                fmi2Boolean(0),
+                fmi2Boolean(debug.into()),
+            )
+        };
+        if component.is_null() {
+            return Err(Error::NoInstance { log: log.take() });
+        }
+        Ok(Slave { functions: &self.functions, component, log })
+    }
+}
+
+/// Collects log lines. It stays where it is, for the unit holds its address.
+#[derive(Debug, Default)]
+pub struct Log(Box<Mutex<Vec<Line>>>);
+
+impl Log {
+    /// Callbacks which write into this log as long as it lives.
+    pub fn callbacks(&self) -> fmi2CallbackFunctions {
+        fmi2CallbackFunctions {
+            logger: Some(logger()),
+            allocateMemory: None,
+            freeMemory: None,
+            stepFinished: None,
+            componentEnvironment: ptr::from_ref(&*self.0).cast_mut().cast(),
+        }
+    }
+
+    /// The lines so far, which are then gone.
+    pub fn take(&self) -> Vec<Line> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Rust cannot define a function with a variable number of arguments. The named ones are passed alike on every platform
+/// this runs on, and the unit passes no others.
+fn logger() -> fmi2CallbackLogger {
+    type Fixed = unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String);
+    unsafe extern "C" fn write(
+        environment: *mut c_void,
+        instance: fmi2String,
+        status: fmi2Status,
+        category: fmi2String,
+        message: fmi2String,
+    ) {
+        let text = |string| unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned();
+        let line = Line { instance: text(instance), status, category: text(category), text: text(message) };
+        let log = unsafe { &*environment.cast::<Mutex<Vec<Line>>>() };
+        log.lock().unwrap_or_else(PoisonError::into_inner).push(line);
+    }
+    unsafe { std::mem::transmute::<Fixed, fmi2CallbackLogger>(write) }
+}
+
+/// An instance of a loaded unit; freed on drop.
+#[derive(Debug)]
+pub struct Slave<'a> {
+    functions: &'a Functions,
+    component: fmi2Component,
+    /// Its log.
+    pub log: Log,
+}
+
+impl Drop for Slave<'_> {
+    fn drop(&mut self) {
+        unsafe { (self.functions.FreeInstance)(self.component) }
+    }
+}
+
+/// Each method is the C function of that name, refused unless it answers fmi2OK or fmi2Warning.
+///
+/// # Errors
+/// [`Error::Refused`] with the lines of the log since the last call of [`Log::take`]; [`Error::Lengths`].
+impl Slave<'_> {
+    /// The bare handle.
+    pub fn component(&self) -> fmi2Component {
+        self.component
+    }
+
+    fn check(&self, function: &'static str, status: fmi2Status) -> Result<(), Error> {
+        match status {
+            fmi2Status::OK | fmi2Status::WARNING => Ok(()),
+            _ => Err(Error::Refused { function, status, log: self.log.take() }),
+        }
+    }
+
+    fn plain(&self, name: &'static str, function: Plain) -> Result<(), Error> {
+        self.check(name, unsafe { function(self.component) })
+    }
+
+    fn read<T>(
+        &self,
+        name: &'static str,
+        function: Get<T>,
+        references: &[fmi2ValueReference],
+        values: &mut [T],
+    ) -> Result<(), Error> {
+        same(references.len(), values.len())?;
+        let (count, values) = (values.len(), values.as_mut_ptr());
+        self.check(name, unsafe { function(self.component, references.as_ptr(), count, values) })
+    }
+
+    fn write<T>(
+        &self,
+        name: &'static str,
+        function: Set<T>,
+        references: &[fmi2ValueReference],
+        values: &[T],
+    ) -> Result<(), Error> {
+        same(references.len(), values.len())?;
+        let (count, values) = (values.len(), values.as_ptr());
+        self.check(name, unsafe { function(self.component, references.as_ptr(), count, values) })
+    }
+
+    /// `fmi2SetupExperiment`
+    pub fn setup_experiment(&self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result<(), Error> {
+        let pair = |value: Option<f64>| (fmi2Boolean(value.is_some().into()), value.unwrap_or_default());
+        let ((tolerance_defined, tolerance), (stop_defined, stop)) = (pair(tolerance), pair(stop));
+        let setup = self.functions.SetupExperiment;
+        let status = unsafe { setup(self.component, tolerance_defined, tolerance, start, stop_defined, stop) };
+        self.check("fmi2SetupExperiment", status)
+    }
+
+    /// `fmi2EnterInitializationMode`
+    pub fn enter_initialization_mode(&self) -> Result<(), Error> {
+        self.plain("fmi2EnterInitializationMode", self.functions.EnterInitializationMode)
+    }
+
+    /// `fmi2ExitInitializationMode`
+    pub fn exit_initialization_mode(&self) -> Result<(), Error> {
+        self.plain("fmi2ExitInitializationMode", self.functions.ExitInitializationMode)
+    }
+
+    /// `fmi2Terminate`
+    pub fn terminate(&self) -> Result<(), Error> {
+        self.plain("fmi2Terminate", self.functions.Terminate)
+    }
+
+    /// `fmi2Reset`
+    pub fn reset(&self) -> Result<(), Error> {
+        self.plain("fmi2Reset", self.functions.Reset)
+    }
+
+    /// `fmi2DoStep`
+    pub fn do_step(&self, time: f64, step_size: f64) -> Result<(), Error> {
+        let status = unsafe { (self.functions.DoStep)(self.component, time, step_size, fmi2Boolean(1)) };
+        self.check("fmi2DoStep", status)
+    }
+
+    /// `fmi2GetReal`
+    pub fn get_real(&self, references: &[fmi2ValueReference], values: &mut [f64]) -> Result<(), Error> {
+        self.read("fmi2GetReal", self.functions.GetReal, references, values)
+    }
+
+    /// `fmi2GetInteger`
+    pub fn get_integer(&self, references: &[fmi2ValueReference], values: &mut [i32]) -> Result<(), Error> {
+        self.read("fmi2GetInteger", self.functions.GetInteger, references, values)
+    }
+
+    /// `fmi2GetBoolean`
+    pub fn get_boolean(&self, references: &[fmi2ValueReference], values: &mut [fmi2Boolean]) -> Result<(), Error> {
+        self.read("fmi2GetBoolean", self.functions.GetBoolean, references, values)
+    }
+
+    /// `fmi2SetReal`
+    pub fn set_real(&self, references: &[fmi2ValueReference], values: &[f64]) -> Result<(), Error> {
+        self.write("fmi2SetReal", self.functions.SetReal, references, values)
+    }
+
+    /// `fmi2SetInteger`
+    pub fn set_integer(&self, references: &[fmi2ValueReference], values: &[i32]) -> Result<(), Error> {
+        self.write("fmi2SetInteger", self.functions.SetInteger, references, values)
+    }
+
+    /// `fmi2SetBoolean`
+    pub fn set_boolean(&self, references: &[fmi2ValueReference], values: &[fmi2Boolean]) -> Result<(), Error> {
+        self.write("fmi2SetBoolean", self.functions.SetBoolean, references, values)
+    }
+}
+
+fn same(references: usize, values: usize) -> Result<(), Error> {
+    if references == values { Ok(()) } else { Err(Error::Lengths { references, values }) }
+}

@@ -1,0 +1,606 @@
+//! One instance of the unit: its lifecycle, get and set, steps. Safe Rust, no C types, no log: what is to be said to
+//! the host is returned, and said at the boundary.
+//!
+//! A call that is refused changes nothing: everything is checked before the first value is written, and the mode
+//! stays. So the standard's state *error* does not exist here; a failed step may be repeated, or the run terminated.
+
+use super::description::{self, ALL, LOG_CATEGORIES};
+use super::variables::{self, Allowed, Kind, Variable};
+use crate::unit::{self, Inputs, Parameters, Unit};
+use std::fmt;
+
+/// Where an instance stands in its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    Instantiated,
+    Initialization,
+    /// At a communication point.
+    StepComplete,
+    Terminated,
+    /// A panic was caught; the instance can only be freed.
+    Fatal,
+}
+
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Instantiated => "instantiated",
+            Self::Initialization => "initialization mode",
+            Self::StepComplete => "step complete",
+            Self::Terminated => "terminated",
+            Self::Fatal => "fatal",
+        })
+    }
+}
+
+/// The functions which take an instance; their names are those of C without the prefix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Function {
+    SetDebugLogging,
+    SetupExperiment,
+    EnterInitializationMode,
+    ExitInitializationMode,
+    Terminate,
+    Reset,
+    GetReal,
+    GetInteger,
+    GetBoolean,
+    GetString,
+    SetReal,
+    SetInteger,
+    SetBoolean,
+    SetString,
+    GetFMUstate,
+    SetFMUstate,
+    FreeFMUstate,
+    SerializedFMUstateSize,
+    SerializeFMUstate,
+    DeSerializeFMUstate,
+    GetDirectionalDerivative,
+    SetRealInputDerivatives,
+    GetRealOutputDerivatives,
+    DoStep,
+    CancelStep,
+    GetStatus,
+    GetRealStatus,
+    GetIntegerStatus,
+    GetBooleanStatus,
+    GetStringStatus,
+}
+
+impl Function {
+    /// The modes in which the standard allows the call. Beyond it, inputs may be set before initialisation, as masters
+    /// do that apply all start values at once; they only replace the start value.
+    fn allowed_in(self) -> &'static [Mode] {
+        use Mode::*;
+        match self {
+            Self::SetupExperiment | Self::EnterInitializationMode => &[Instantiated],
+            Self::ExitInitializationMode => &[Initialization],
+            Self::Terminate | Self::DoStep | Self::CancelStep => &[StepComplete],
+            Self::SetReal | Self::SetInteger | Self::SetBoolean | Self::SetString | Self::SetRealInputDerivatives => {
+                &[Instantiated, Initialization, StepComplete]
+            }
+            Self::GetReal | Self::GetInteger | Self::GetBoolean | Self::GetString | Self::GetDirectionalDerivative => {
+                &[Initialization, StepComplete, Terminated]
+            }
+            Self::GetRealOutputDerivatives
+            | Self::GetStatus
+            | Self::GetRealStatus
+            | Self::GetIntegerStatus
+            | Self::GetBooleanStatus
+            | Self::GetStringStatus => &[StepComplete, Terminated],
+            Self::SetDebugLogging
+            | Self::Reset
+            | Self::GetFMUstate
+            | Self::SetFMUstate
+            | Self::FreeFMUstate
+            | Self::SerializedFMUstateSize
+            | Self::SerializeFMUstate
+            | Self::DeSerializeFMUstate => &[Instantiated, Initialization, StepComplete, Terminated],
+        }
+    }
+}
+
+impl fmt::Display for Function {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "fmi2{self:?}")
+    }
+}
+
+/// Why a call is refused.
+#[derive(Clone, Debug)]
+pub enum Failure {
+    WrongMode {
+        mode: Mode,
+        allowed: &'static [Mode],
+    },
+    NullPointer {
+        argument: &'static str,
+    },
+    EmptyName,
+    WrongType {
+        given: i32,
+    },
+    WrongGuid {
+        given: String,
+    },
+    UnknownReference {
+        reference: u32,
+    },
+    WrongKind {
+        variable: Variable,
+        asked: Kind,
+    },
+    NotSettable {
+        variable: Variable,
+        value: f64,
+    },
+    NotAllowed {
+        variable: Variable,
+        value: f64,
+    },
+    ZeroQuaternion,
+    BadArgument {
+        argument: &'static str,
+        value: f64,
+        allowed: Allowed,
+    },
+    StopBeforeStart {
+        start: f64,
+        stop: f64,
+    },
+    WrongTime {
+        given: f64,
+        expected: f64,
+    },
+    PastStopTime {
+        end: f64,
+        stop: f64,
+    },
+    UnknownCategory {
+        name: String,
+    },
+    NotSupported {
+        what: &'static str,
+    },
+    /// Answered with `fmi2Discard`.
+    NothingPending {
+        asked: StatusKind,
+    },
+    WrongStatusKind {
+        given: i32,
+    },
+    Unit(unit::Error),
+    Panic {
+        message: String,
+    },
+}
+
+/// What may be asked with the five status functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StatusKind {
+    DoStepStatus,
+    PendingStatus,
+    LastSuccessfulTime,
+    Terminated,
+}
+
+impl StatusKind {
+    pub fn new(number: i32) -> Result<Self, Failure> {
+        [Self::DoStepStatus, Self::PendingStatus, Self::LastSuccessfulTime, Self::Terminated]
+            .into_iter()
+            .find(|kind| *kind as i32 == number)
+            .ok_or(Failure::WrongStatusKind { given: number })
+    }
+
+    /// This kind where one of another type was asked for.
+    pub fn mismatch(self) -> Failure {
+        Failure::WrongStatusKind { given: self as i32 }
+    }
+
+    /// A step is finished when [`Instance::do_step`] returns, so nothing can be said of a pending one. The standard
+    /// has fmi2Discard for a status that is not available.
+    pub fn pending<T>(self, answered: Self) -> Result<T, Failure> {
+        Err(if self == answered { Failure::NothingPending { asked: self } } else { self.mismatch() })
+    }
+}
+
+impl From<unit::Error> for Failure {
+    fn from(error: unit::Error) -> Self {
+        Self::Unit(error)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::WrongMode { mode, allowed } => {
+                write!(f, "not allowed in the state '{mode}', only in")?;
+                for (k, mode) in allowed.iter().enumerate() {
+                    write!(f, "{} '{mode}'", if k == 0 { "" } else { "," })?;
+                }
+                Ok(())
+            }
+            Self::NullPointer { argument } => write!(f, "{argument} is a null pointer, or no array of that length"),
+            Self::EmptyName => write!(f, "instanceName is empty; it must name the instance"),
+            Self::WrongType { given } => write!(f, "fmuType = {given} is not allowed: only 1 (fmi2CoSimulation)"),
+            Self::WrongGuid { given } => {
+                write!(f, "fmuGUID = '{given}' is not allowed: this library is {}", description::guid())
+            }
+            Self::UnknownReference { reference } => write!(
+                f,
+                "value reference {reference} is unknown: those of the model description run from 0 to {}",
+                variables::all().len() - 1
+            ),
+            Self::WrongKind { variable, asked } => {
+                write!(f, "{variable} is of type {:?}, not {asked:?}", variable.kind())
+            }
+            Self::NotSettable { variable, value } => {
+                let why = if variable.is_output() {
+                    "an output is never set"
+                } else {
+                    "a fixed parameter is set before the end of the initialization"
+                };
+                write!(f, "{variable} = {value} is not allowed: {why}")
+            }
+            Self::NotAllowed { variable, value } => {
+                write!(f, "{variable} = {value} is not allowed: {}", variable.allowed())
+            }
+            Self::ZeroQuaternion => {
+                write!(
+                    f,
+                    "base.orientation = 0, 0, 0, 0 is not allowed: a quaternion other than zero, normalised on use"
+                )
+            }
+            Self::BadArgument { argument, value, allowed } => {
+                write!(f, "{argument} = {value} is not allowed: {allowed}")
+            }
+            Self::StopBeforeStart { start, stop } => {
+                write!(f, "stopTime = {stop} is not allowed: finite and >= startTime = {start}")
+            }
+            Self::WrongTime { given, expected } => {
+                write!(f, "currentCommunicationPoint = {given} is not allowed: the instance is at {expected}")
+            }
+            Self::PastStopTime { end, stop } => {
+                write!(f, "a step to {end} is not allowed: the experiment ends at stopTime = {stop}")
+            }
+            Self::UnknownCategory { name } => {
+                write!(f, "category '{name}' is unknown: only")?;
+                LOG_CATEGORIES.iter().try_for_each(|(name, _)| write!(f, " {name}"))
+            }
+            Self::NotSupported { what } => write!(f, "{what} not supported, as the model description says"),
+            Self::NothingPending { asked } => {
+                write!(f, "fmi2{asked:?} is not available: a step is finished when fmi2DoStep returns")
+            }
+            Self::WrongStatusKind { given } => write!(f, "status kind {given} is unknown or not of this type"),
+            Self::Unit(error) => error.fmt(f),
+            Self::Panic { message } => write!(f, "panic, the instance can only be freed: {message}"),
+        }
+    }
+}
+
+/// What the host is told about a call that succeeded.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Note {
+    Initialized { cells: i32 },
+    Repeated { retries: i32, end: f64 },
+    Terminated { steps: i32, iterations: i32, retries: i32 },
+    Warning(unit::Warning),
+}
+
+impl Note {
+    /// One of the declared log categories.
+    pub fn category(&self) -> &'static str {
+        match self {
+            Self::Initialized { .. } | Self::Terminated { .. } => "logEvents",
+            Self::Repeated { .. } => "logNonlinearSystems",
+            Self::Warning(_) => "logStatusWarning",
+        }
+    }
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Initialized { cells } => write!(f, "initialized with {cells} cells"),
+            Self::Repeated { retries, end } => {
+                write!(f, "on the way to {end} s, {retries} internal steps were tried again with smaller ones")
+            }
+            Self::Terminated { steps, iterations, retries } => {
+                write!(f, "terminated after {steps} internal steps, {iterations} iterations, {retries} retries")
+            }
+            Self::Warning(warning) => warning.fmt(f),
+        }
+    }
+}
+
+/// The end of a call.
+pub type Answer = Result<Option<Note>, Failure>;
+
+/// A type of the C interface that carries values of one kind.
+pub trait Scalar: Copy {
+    const KIND: Kind;
+    fn to_f64(self) -> f64;
+    /// From a value of this kind, which an `f64` carries without loss.
+    fn from_f64(value: f64) -> Self;
+}
+
+impl Scalar for f64 {
+    const KIND: Kind = Kind::Real;
+    fn to_f64(self) -> f64 {
+        self
+    }
+    fn from_f64(value: f64) -> Self {
+        value
+    }
+}
+
+impl Scalar for i32 {
+    const KIND: Kind = Kind::Integer;
+    fn to_f64(self) -> f64 {
+        self.into()
+    }
+    fn from_f64(value: f64) -> Self {
+        value as i32
+    }
+}
+
+/// Times closer than this part of a step, or of the time itself, are the same to a host that adds up its steps; the
+/// rounding of a million additions stays below the second, and a step that is too early or too late stands out from both.
+const SAME_TIME: [f64; 2] = [1e-6, 1e-12];
+
+/// Name of an instance that panics in its first step, in builds with debug assertions only: the guard has to be seen at
+/// work through the boundary, and no input is known that makes the unit panic.
+const PANICKING: &str = "panic in fmi2DoStep";
+
+/// One instance.
+#[derive(Debug)]
+pub struct Instance {
+    name: String,
+    mode: Mode,
+    debug: Debug,
+    variables: Vec<Variable>,
+    experiment: Experiment,
+    parameters: Parameters,
+    inputs: Inputs,
+    /// Before the first step a set drops it, and a get or the end of the initialisation builds it.
+    unit: Option<Box<Unit>>,
+    time: f64,
+}
+
+/// What [`Instance::setup_experiment`] was told.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Experiment {
+    tolerance: Option<f64>,
+    start: f64,
+    stop: Option<f64>,
+}
+
+/// Which debug lines the host wants.
+#[derive(Clone, Debug, PartialEq)]
+struct Debug {
+    on: bool,
+    /// Empty = all.
+    categories: Vec<&'static str>,
+}
+
+impl Instance {
+    /// As after `fmi2Instantiate`.
+    pub fn new(name: String, guid: &str, debug: bool) -> Result<Self, Failure> {
+        if name.is_empty() {
+            return Err(Failure::EmptyName);
+        }
+        if guid != description::guid() {
+            return Err(Failure::WrongGuid { given: guid.to_owned() });
+        }
+        Ok(Self {
+            name,
+            mode: Mode::Instantiated,
+            debug: Debug { on: debug, categories: Vec::new() },
+            variables: variables::all(),
+            experiment: Experiment::default(),
+            parameters: Parameters::default(),
+            inputs: Inputs::default(),
+            unit: None,
+            time: 0.0,
+        })
+    }
+
+    /// The communication point.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Whether the call is allowed now.
+    pub fn admits(&self, function: Function) -> Result<(), Failure> {
+        let allowed = function.allowed_in();
+        if allowed.contains(&self.mode) { Ok(()) } else { Err(Failure::WrongMode { mode: self.mode, allowed }) }
+    }
+
+    /// After a panic.
+    pub fn give_up(&mut self) {
+        self.mode = Mode::Fatal;
+    }
+
+    /// Whether a debug line of this category is to be logged.
+    ///
+    /// Warnings and errors are no debug lines. The standard says of the statuses fmi2Warning, fmi2Error and fmi2Fatal
+    /// that the logger *was called*, and leaves it to the logger what to show; a host that switches debug lines off
+    /// would otherwise learn that a call failed and never why.
+    pub fn wants(&self, note: &Note) -> bool {
+        let Debug { on, categories } = &self.debug;
+        let listed = || categories.is_empty() || categories.contains(&note.category()) || categories.contains(&ALL);
+        matches!(note, Note::Warning(_)) || (*on && listed())
+    }
+
+    pub fn set_debug_logging(&mut self, on: bool, names: &[String]) -> Answer {
+        let known = |name: &String| {
+            let mut categories = LOG_CATEGORIES.iter().map(|(category, _)| *category);
+            categories.find(|category| category == name).ok_or(Failure::UnknownCategory { name: name.clone() })
+        };
+        let categories = names.iter().map(known).collect::<Result<_, _>>()?;
+        self.debug = Debug { on, categories };
+        Ok(None)
+    }
+
+    /// A tolerance of zero counts as none, as for the parameter.
+    pub fn setup_experiment(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Answer {
+        check("startTime", start, Allowed::Finite)?;
+        if let Some(tolerance) = tolerance {
+            check("tolerance", tolerance, Allowed::NonNegative)?;
+        }
+        if let Some(stop) = stop.filter(|stop| !(stop.is_finite() && *stop >= start)) {
+            return Err(Failure::StopBeforeStart { start, stop });
+        }
+        self.experiment = Experiment { tolerance: tolerance.filter(|tolerance| *tolerance > 0.0), start, stop };
+        self.time = start;
+        self.unit = None;
+        Ok(None)
+    }
+
+    pub fn enter_initialization_mode(&mut self) -> Answer {
+        self.mode = Mode::Initialization;
+        Ok(None)
+    }
+
+    pub fn exit_initialization_mode(&mut self) -> Answer {
+        let cells = self.unit()?.outputs().cells;
+        self.mode = Mode::StepComplete;
+        Ok(Some(Note::Initialized { cells }))
+    }
+
+    pub fn terminate(&mut self) -> Answer {
+        let outputs = self.unit()?.outputs();
+        let (steps, iterations, retries) = (outputs.steps, outputs.iterations, outputs.retries);
+        self.mode = Mode::Terminated;
+        Ok(Some(Note::Terminated { steps, iterations, retries }))
+    }
+
+    /// As after `fmi2Instantiate`; which debug lines the host wants is no part of the simulation and stays.
+    pub fn reset(&mut self) -> Answer {
+        self.mode = Mode::Instantiated;
+        self.experiment = Experiment::default();
+        self.parameters = Parameters::default();
+        self.inputs = Inputs::default();
+        self.unit = None;
+        self.time = 0.0;
+        Ok(None)
+    }
+
+    pub fn get<T: Scalar>(&mut self, references: &[u32], values: &mut [T]) -> Answer {
+        for &reference in references {
+            if self.variable(reference, T::KIND)?.is_output() {
+                self.unit()?;
+            }
+        }
+        for (&reference, value) in references.iter().zip(values) {
+            let variable = self.variable(reference, T::KIND)?;
+            let given = variable.given(&mut self.parameters, &mut self.inputs);
+            let computed = || self.unit.as_ref().and_then(|unit| variable.computed(unit.outputs()));
+            if let Some(number) = given.or_else(computed) {
+                *value = T::from_f64(number);
+            }
+        }
+        Ok(None)
+    }
+
+    pub fn set<T: Scalar>(&mut self, references: &[u32], values: &[T]) -> Answer {
+        for (&reference, value) in references.iter().zip(values) {
+            let (variable, value) = (self.variable(reference, T::KIND)?, value.to_f64());
+            let settable = match self.mode {
+                Mode::StepComplete => variable.is_settable_while_stepping(),
+                _ => !variable.is_output(),
+            };
+            if !settable {
+                return Err(Failure::NotSettable { variable, value });
+            }
+            if !variable.allowed().contains(value) {
+                return Err(Failure::NotAllowed { variable, value });
+            }
+        }
+        for (&reference, value) in references.iter().zip(values) {
+            self.variable(reference, T::KIND)?.set(&mut self.parameters, &mut self.inputs, value.to_f64());
+        }
+        if self.mode != Mode::StepComplete {
+            self.unit = None;
+        } else if let Some(unit) = &mut self.unit {
+            unit.set_gravity(self.parameters.gravity);
+        }
+        Ok(None)
+    }
+
+    /// The unit has no strings, so every reference is of the wrong kind, or of none.
+    pub fn no_strings(&self, references: &[u32]) -> Answer {
+        references.iter().try_for_each(|&reference| self.variable(reference, Kind::String).map(drop))?;
+        Ok(None)
+    }
+
+    pub fn do_step(&mut self, time: f64, step_size: f64) -> Answer {
+        if cfg!(debug_assertions) && self.name == PANICKING {
+            panic!("as the name of the instance demands");
+        }
+        check("currentCommunicationPoint", time, Allowed::Finite)?;
+        check("communicationStepSize", step_size, Allowed::Positive)?;
+        let near = SAME_TIME[0] * step_size + SAME_TIME[1] * self.time.abs();
+        if (time - self.time).abs() > near {
+            return Err(Failure::WrongTime { given: time, expected: self.time });
+        }
+        let end = time + step_size;
+        if let Some(stop) = self.experiment.stop.filter(|stop| end > stop + near) {
+            return Err(Failure::PastStopTime { end, stop });
+        }
+        self.check_orientation()?;
+        let inputs = self.inputs.clone();
+        let own_step = (time - self.time) + step_size;
+        let unit = self.unit()?;
+        let retries = unit.outputs().retries;
+        let warning = unit.advance(&inputs, own_step)?;
+        let retries = unit.outputs().retries - retries;
+        self.time = end;
+        Ok(match warning {
+            Some(warning) => Some(Note::Warning(warning)),
+            None => (retries > 0).then_some(Note::Repeated { retries, end }),
+        })
+    }
+
+    pub fn last_successful_time(&self, kind: StatusKind) -> Result<f64, Failure> {
+        match kind {
+            StatusKind::LastSuccessfulTime => Ok(self.time),
+            _ => Err(kind.mismatch()),
+        }
+    }
+
+    /// The unit never asks for the end of the simulation.
+    pub fn wants_to_terminate<T: Scalar>(&self, kind: StatusKind) -> Result<T, Failure> {
+        match kind {
+            StatusKind::Terminated => Ok(T::from_f64(0.0)),
+            _ => Err(kind.mismatch()),
+        }
+    }
+
+    fn variable(&self, reference: u32, kind: Kind) -> Result<Variable, Failure> {
+        let variable = usize::try_from(reference).ok().and_then(|place| self.variables.get(place));
+        let variable = *variable.ok_or(Failure::UnknownReference { reference })?;
+        if variable.kind() == kind { Ok(variable) } else { Err(Failure::WrongKind { variable, asked: kind }) }
+    }
+
+    fn unit(&mut self) -> Result<&mut Unit, Failure> {
+        let unit = match self.unit.take() {
+            Some(unit) => unit,
+            None => {
+                self.check_orientation()?;
+                Box::new(Unit::new(&self.parameters, &self.inputs, self.experiment.tolerance)?)
+            }
+        };
+        Ok(self.unit.insert(unit))
+    }
+
+    /// Seen only where it is used: between two calls of a host that sets component by component it may be zero.
+    fn check_orientation(&self) -> Result<(), Failure> {
+        if self.inputs.base_orientation.amax() > 0.0 { Ok(()) } else { Err(Failure::ZeroQuaternion) }
+    }
+}
+
+fn check(argument: &'static str, value: f64, allowed: Allowed) -> Result<(), Failure> {
+    if allowed.contains(value) { Ok(()) } else { Err(Failure::BadArgument { argument, value, allowed }) }
+}

@@ -1,0 +1,16 @@
+//! The unit as an FMI 2.0 co-simulation slave.
+//!
+//! ```text
+//! host =C=> abi -> instance -> variables -> unit
+//! description -> variables          host: the other side of the C boundary, for the demo, the tests and the benchmarks
+//! ```
+
+pub mod variables;
+
+pub mod description;
+
+mod instance;
+
+mod abi;
+
+pub mod host;

@@ -1,0 +1,466 @@
+//! The variables of the unit: one row each, from which value references, get and set, units, the model description and
+//! its dependencies follow.
+//!
+//! A row is a scalar, an array, or one array per station of the centreline; [`all`] unrolls the rows into scalar
+//! variables, and the value reference of a variable is its place in that list. It is one list for all types, so that a
+//! reference taken for the wrong type is noticed.
+
+use crate::unit::{Inputs, Outputs, Parameters, STATIONS};
+use std::fmt;
+
+/// Type of a variable in the sense of FMI.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// `fmi2Real`.
+    Real,
+    /// `fmi2Integer`.
+    Integer,
+    /// `fmi2Boolean`.
+    Boolean,
+    /// `fmi2String`; the unit has none.
+    String,
+}
+
+/// What a variable may be set to, beyond being finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Allowed {
+    /// Every finite value.
+    Finite,
+    /// Above zero.
+    Positive,
+    /// Zero and above.
+    NonNegative,
+    /// Both ends included.
+    Between(f64, f64),
+    /// A whole number, both ends included.
+    Choice(i32, i32),
+}
+
+impl Allowed {
+    /// Whether `value` may be set. NaN and infinities never may.
+    pub fn contains(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Finite => true,
+                Self::Positive => value > 0.0,
+                Self::NonNegative => value >= 0.0,
+                Self::Between(low, high) => (low..=high).contains(&value),
+                Self::Choice(low, high) => (f64::from(low)..=f64::from(high)).contains(&value),
+            }
+    }
+
+    /// The attribute `min`; that of a positive variable is the bound it must not reach, as FMI knows only closed ranges.
+    pub fn min(self) -> Option<f64> {
+        match self {
+            Self::Finite => None,
+            Self::Positive | Self::NonNegative => Some(0.0),
+            Self::Between(low, _) => Some(low),
+            Self::Choice(low, _) => Some(low.into()),
+        }
+    }
+
+    /// The attribute `max`.
+    pub fn max(self) -> Option<f64> {
+        match self {
+            Self::Finite | Self::Positive | Self::NonNegative => None,
+            Self::Between(_, high) => Some(high),
+            Self::Choice(_, high) => Some(high.into()),
+        }
+    }
+}
+
+impl fmt::Display for Allowed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Finite => write!(f, "finite"),
+            Self::Positive => write!(f, "finite and > 0"),
+            Self::NonNegative => write!(f, "finite and >= 0"),
+            Self::Between(low, high) => write!(f, "from {low} to {high}"),
+            Self::Choice(low, high) => write!(f, "a whole number from {low} to {high}"),
+        }
+    }
+}
+
+/// Where a variable lives; the second argument is the element of an array, 0 for a scalar.
+#[derive(Clone, Copy, Debug)]
+pub enum Slot {
+    /// Fixed after initialisation.
+    Parameter(fn(&mut Parameters, usize) -> &mut f64, Allowed),
+    /// May be set at communication points as well, from where the next step sees it.
+    Tunable(fn(&mut Parameters, usize) -> &mut f64, Allowed),
+    /// Fixed after initialisation.
+    IntegerParameter(fn(&mut Parameters) -> &mut i32, Allowed),
+    /// Fixed after initialisation.
+    BooleanParameter(fn(&mut Parameters) -> &mut bool),
+    /// Acts in the step that follows.
+    Input(fn(&mut Inputs, usize) -> &mut f64),
+    /// Computed.
+    Output(fn(&Outputs, usize) -> f64, Initially),
+    /// Computed.
+    IntegerOutput(fn(&Outputs) -> i32, Initially),
+}
+
+/// What the value of an output at the end of initialisation depends on; the names are those of rows.
+///
+/// Later than that no output depends on the *present* value of any input: an input acts in the `fmi2DoStep` that
+/// follows, and a get between a set and that step still answers with the state at the end of the last step. So the
+/// outputs of the model structure have no dependencies at all, and a master that closes a loop through the unit finds
+/// no algebraic loop at a communication point. This would change with inputs that feed through, such as an acceleration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Initially {
+    /// On none: always the same value.
+    Constant,
+    /// On all parameters and inputs but these.
+    AllBut(&'static [&'static str]),
+}
+
+impl Initially {
+    fn on(self, name: &str) -> bool {
+        match self {
+            Self::Constant => false,
+            Self::AllBut(names) => !names.contains(&name),
+        }
+    }
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Name, without the index of an array; `[i]` stands for the number of the station.
+    pub name: &'static str,
+    /// Unit, empty if none; one of those in [`UNITS`].
+    pub unit: &'static str,
+    /// Names of the elements; empty for a scalar.
+    pub components: &'static [&'static str],
+    /// How often the row is repeated, once or for every station.
+    pub copies: usize,
+    /// Where it lives.
+    pub slot: Slot,
+    /// Meaning, with frame, sign and reference point.
+    pub description: &'static str,
+}
+
+impl Row {
+    fn elements(&self) -> usize {
+        self.components.len().max(1) * self.copies
+    }
+}
+
+/// A scalar variable: an element of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct Variable {
+    /// Its row.
+    pub row: &'static Row,
+    /// Which element of it, from 0.
+    pub element: usize,
+}
+
+/// The names of this variable are dotted, its indices count from 1.
+impl fmt::Display for Variable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.row.components.len().max(1);
+        match self.row.name.split_once("[i]") {
+            Some((before, after)) => write!(f, "{before}[{}]{after}", self.element / width + 1)?,
+            None => f.write_str(self.row.name)?,
+        }
+        if self.row.components.is_empty() { Ok(()) } else { write!(f, "[{}]", self.element % width + 1) }
+    }
+}
+
+impl Variable {
+    /// Its type.
+    pub fn kind(&self) -> Kind {
+        match self.row.slot {
+            Slot::Parameter(..) | Slot::Tunable(..) | Slot::Input(_) | Slot::Output(..) => Kind::Real,
+            Slot::IntegerParameter(..) | Slot::IntegerOutput(..) => Kind::Integer,
+            Slot::BooleanParameter(_) => Kind::Boolean,
+        }
+    }
+
+    /// Whether it is computed.
+    pub fn is_output(&self) -> bool {
+        matches!(self.row.slot, Slot::Output(..) | Slot::IntegerOutput(..))
+    }
+
+    /// Whether it may be set at communication points.
+    pub fn is_settable_while_stepping(&self) -> bool {
+        matches!(self.row.slot, Slot::Input(_) | Slot::Tunable(..))
+    }
+
+    /// What it may be set to.
+    pub fn allowed(&self) -> Allowed {
+        match self.row.slot {
+            Slot::Parameter(_, allowed) | Slot::Tunable(_, allowed) | Slot::IntegerParameter(_, allowed) => allowed,
+            Slot::BooleanParameter(_) => Allowed::Choice(0, 1),
+            Slot::Input(_) | Slot::Output(..) | Slot::IntegerOutput(..) => Allowed::Finite,
+        }
+    }
+
+    /// What it means, with the component of an array named.
+    pub fn description(&self) -> String {
+        match self.row.components {
+            [] => self.row.description.to_owned(),
+            names => format!("{}: {}", self.row.description, names[self.element % names.len()]),
+        }
+    }
+
+    /// Whether the value of this output at the end of initialisation may depend on `known`.
+    pub fn depends_initially_on(&self, known: &Variable) -> bool {
+        match self.row.slot {
+            Slot::Output(_, initially) | Slot::IntegerOutput(_, initially) => initially.on(known.row.name),
+            _ => false,
+        }
+    }
+
+    /// Its value where it is set, `None` for an output. Every type of the unit fits into an `f64` without loss.
+    pub fn given(&self, parameters: &mut Parameters, inputs: &mut Inputs) -> Option<f64> {
+        match self.row.slot {
+            Slot::Parameter(at, _) | Slot::Tunable(at, _) => Some(*at(parameters, self.element)),
+            Slot::IntegerParameter(at, _) => Some((*at(parameters)).into()),
+            Slot::BooleanParameter(at) => Some(u8::from(*at(parameters)).into()),
+            Slot::Input(at) => Some(*at(inputs, self.element)),
+            Slot::Output(..) | Slot::IntegerOutput(..) => None,
+        }
+    }
+
+    /// Its value where it is computed, `None` for a parameter or an input.
+    pub fn computed(&self, outputs: &Outputs) -> Option<f64> {
+        match self.row.slot {
+            Slot::Output(at, _) => Some(at(outputs, self.element)),
+            Slot::IntegerOutput(at, _) => Some(at(outputs).into()),
+            _ => None,
+        }
+    }
+
+    /// Sets a parameter or an input to a value that [`Variable::allowed`] contains; an output stays.
+    pub fn set(&self, parameters: &mut Parameters, inputs: &mut Inputs, value: f64) {
+        match self.row.slot {
+            Slot::Parameter(at, _) | Slot::Tunable(at, _) => *at(parameters, self.element) = value,
+            // Exact: the value came from an i32, or is 0 or 1.
+            Slot::IntegerParameter(at, _) => *at(parameters) = value as i32,
+            Slot::BooleanParameter(at) => *at(parameters) = value != 0.0,
+            Slot::Input(at) => *at(inputs, self.element) = value,
+            Slot::Output(..) | Slot::IntegerOutput(..) => {}
+        }
+    }
+}
+
+/// The scalar variables, each at the place of its value reference.
+pub fn all() -> Vec<Variable> {
+    ROWS.iter().flat_map(|row| (0..row.elements()).map(move |element| Variable { row, element })).collect()
+}
+
+const fn scalar(name: &'static str, unit: &'static str, slot: Slot, description: &'static str) -> Row {
+    Row { name, unit, components: &[], copies: 1, slot, description }
+}
+
+const fn array(
+    name: &'static str,
+    unit: &'static str,
+    components: &'static [&'static str],
+    slot: Slot,
+    description: &'static str,
+) -> Row {
+    Row { name, unit, components, copies: 1, slot, description }
+}
+
+const XYZ: &[&str] = &["x", "y", "z"];
+const WXYZ: &[&str] = &["w", "x", "y", "z"];
+const DIRECTORS: &[&str] = &["d1", "d2", "d3"];
+
+/// What only the passage of time makes felt. The shape at the start, and what follows from it, does not depend on it.
+const SHAPE: Initially = Initially::AllBut(&[
+    "damping.bending",
+    "damping.twist",
+    "damping.drag",
+    "tip.inertia",
+    "base.motion",
+    "step",
+    "spectral_radius",
+    "base.velocity",
+    "base.angular_velocity",
+]);
+/// Damping and the start in motion reach the accelerations, and these the reaction; only the time steps do not.
+const START: Initially = Initially::AllBut(&["step", "spectral_radius"]);
+
+use Allowed::{Between, Choice, Finite, NonNegative, Positive};
+use Slot::{BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
+
+/// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
+const MOST_CELLS: i32 = 100_000;
+
+/// The table.
+#[rustfmt::skip]
+pub static ROWS: &[Row] = &[
+    scalar("length", "m", Parameter(|p, _| &mut p.length, Positive),
+        "Arc length of the unstressed rod, > 0"),
+    scalar("radius", "m", Parameter(|p, _| &mut p.radius, Positive),
+        "Radius of the circular section, > 0"),
+    scalar("density", "kg/m3", Parameter(|p, _| &mut p.density, Positive),
+        "Density, > 0"),
+    scalar("youngs_modulus", "Pa", Parameter(|p, _| &mut p.youngs_modulus, Positive),
+        "Young's modulus, > 0"),
+    scalar("shear_modulus", "Pa", Parameter(|p, _| &mut p.shear_modulus, Positive),
+        "Shear modulus, > 0"),
+    scalar("section.area", "m2", Parameter(|p, _| &mut p.section_area, NonNegative),
+        "Area of the section; 0 = from the radius"),
+    array("section.second_moment", "m4", &["about d1", "about d2"],
+        Parameter(|p, k| &mut p.section_second_moment[k], NonNegative),
+        "Second moment of area about a principal axis of the section; 0 = from the radius"),
+    scalar("section.torsion_constant", "m4", Parameter(|p, _| &mut p.section_torsion_constant, NonNegative),
+        "Torsion constant of the section; 0 = sum of the second moments in use"),
+    scalar("section.shear_correction", "", Parameter(|p, _| &mut p.section_shear_correction, Positive),
+        "Shear correction factor, > 0; used when extensible"),
+    array("rest_curvature", "1/m", DIRECTORS, Parameter(|p, k| &mut p.rest_curvature[k], Finite),
+        "Curvature (about d1, d2) and twist (about d3) of the unstressed rod, body frame, d3 along the rod"),
+    array("gravity", "m/s2", XYZ, Tunable(|p, k| &mut p.gravity[k], Finite),
+        "Acceleration of gravity, world frame"),
+    scalar("damping.bending", "s", Parameter(|p, _| &mut p.damping_bending, NonNegative),
+        "Kelvin-Voigt time constant of bending"),
+    scalar("damping.twist", "s", Parameter(|p, _| &mut p.damping_twist, NonNegative),
+        "Kelvin-Voigt time constant of twist"),
+    scalar("damping.drag", "N.s/m2", Parameter(|p, _| &mut p.damping_drag, NonNegative),
+        "Linear drag: force per length and velocity, against the velocity in the world frame"),
+    scalar("tip.mass", "kg", Parameter(|p, _| &mut p.tip_mass, NonNegative),
+        "Mass of a body whose centre is the tip point"),
+    scalar("tip.inertia", "kg.m2", Parameter(|p, _| &mut p.tip_inertia, NonNegative),
+        "Isotropic inertia of that body about the tip point"),
+    scalar("extensible", "", BooleanParameter(|p| &mut p.extensible),
+        "Whether the section shears and stretches"),
+    scalar("base.motion", "", IntegerParameter(|p| &mut p.base_motion, Choice(0, 2)),
+        "Which inputs move the base: 0 pose and twist, 1 pose only (twist derived), 2 twist only (pose integrated from the initial one)"),
+    scalar("cells", "", IntegerParameter(|p| &mut p.cells, Choice(0, MOST_CELLS)),
+        "Cells along the rod; 0 = chosen by the unit"),
+    scalar("stages", "", IntegerParameter(|p| &mut p.stages, Choice(0, 4)),
+        "Gauss points in a cell, 1 to 4; 0 = chosen by the unit"),
+    scalar("step", "s", Parameter(|p, _| &mut p.step, NonNegative),
+        "Every communication step is divided into equal steps not longer than this; 0 = chosen by the unit"),
+    scalar("tolerance", "", Parameter(|p, _| &mut p.tolerance, NonNegative),
+        "Tolerance of the tip position relative to the length; 0 = that of the experiment, else 1e-3"),
+    scalar("spectral_radius", "", Parameter(|p, _| &mut p.spectral_radius, Between(0.0, 1.0)),
+        "Spectral radius of the time integrator at infinite frequency: 0 damps most, 1 nothing"),
+    scalar("start_in_equilibrium", "", BooleanParameter(|p| &mut p.start_in_equilibrium),
+        "Whether the run starts from the static equilibrium under gravity and the initial inputs instead of the rest shape"),
+
+    array("base.position", "m", XYZ, Input(|i, k| &mut i.base_position[k]),
+        "Position of the base point, world frame"),
+    array("base.orientation", "", WXYZ, Input(|i, k| &mut i.base_orientation[k]),
+        "Orientation of the base, quaternion from body to world frame, normalised on use; identity: the rod leaves along world +z"),
+    array("base.velocity", "m/s", XYZ, Input(|i, k| &mut i.base_velocity[k]),
+        "Velocity of the base point, world frame"),
+    array("base.angular_velocity", "rad/s", XYZ, Input(|i, k| &mut i.base_angular_velocity[k]),
+        "Angular velocity of the base, world frame"),
+    array("tip.force", "N", XYZ, Input(|i, k| &mut i.tip_force[k]),
+        "Force exerted on the tip of the rod by its surroundings, world frame"),
+    array("tip.moment", "N.m", XYZ, Input(|i, k| &mut i.tip_moment[k]),
+        "Moment exerted on the tip of the rod by its surroundings, about the tip point, world frame"),
+
+    array("tip.position", "m", XYZ, Output(|o, k| o.tip_position[k], SHAPE),
+        "Position of the tip point, world frame"),
+    array("tip.orientation", "", WXYZ, Output(|o, k| o.tip_orientation[k], SHAPE),
+        "Orientation of the tip, unit quaternion from body to world frame"),
+    array("tip.velocity", "m/s", XYZ, Output(|o, k| o.tip_velocity[k], START),
+        "Velocity of the tip point, world frame"),
+    array("tip.angular_velocity", "rad/s", XYZ, Output(|o, k| o.tip_angular_velocity[k], START),
+        "Angular velocity of the tip, world frame"),
+    array("base.reaction_force", "N", XYZ, Output(|o, k| o.base_reaction_force[k], START),
+        "Force the rod exerts on its base, world frame; add it to the forces on the base"),
+    array("base.reaction_moment", "N.m", XYZ, Output(|o, k| o.base_reaction_moment[k], START),
+        "Moment the rod exerts on its base, about the base point, world frame; add it to the moments on the base"),
+    Row { name: "station[i].position", unit: "m", components: XYZ, copies: STATIONS,
+        slot: Output(|o, k| o.stations[k / 3][k % 3], SHAPE),
+        description: "Position of the centreline at equal arc lengths from the base (first) to the tip (last), world frame" },
+    scalar("energy.kinetic", "J", Output(|o, _| o.energy.kinetic, START),
+        "Kinetic energy of the rod and the body at its tip"),
+    scalar("energy.elastic", "J", Output(|o, _| o.energy.elastic, SHAPE),
+        "Elastic energy"),
+    scalar("energy.gravity", "J", Output(|o, _| o.energy.gravity, SHAPE),
+        "Potential energy of gravity, zero at the world origin"),
+    scalar("energy.dissipated", "J", Output(|o, _| o.energy.dissipated, Initially::Constant),
+        "Energy lost in damping and drag since the start"),
+    scalar("energy.work_base", "J", Output(|o, _| o.energy.work_base, Initially::Constant),
+        "Work the base has done on the rod since the start"),
+    scalar("energy.work_tip", "J", Output(|o, _| o.energy.work_tip, Initially::Constant),
+        "Work the tip force and moment have done on the rod since the start"),
+    scalar("solver.steps", "", IntegerOutput(|o| o.steps, Initially::Constant),
+        "Internal steps since the start"),
+    scalar("solver.iterations", "", IntegerOutput(|o| o.iterations, START),
+        "Newton iterations since the start, those of the start included"),
+    scalar("solver.retries", "", IntegerOutput(|o| o.retries, Initially::Constant),
+        "Internal steps tried again since the start"),
+    scalar("solver.cells", "", IntegerOutput(|o| o.cells, START),
+        "Cells in use"),
+];
+
+/// The units of the table, each with its exponents of kg, m, s and rad.
+#[rustfmt::skip]
+pub const UNITS: &[(&str, [i32; 4])] = &[
+    ("m",      [0, 1, 0, 0]),
+    ("m2",     [0, 2, 0, 0]),
+    ("m4",     [0, 4, 0, 0]),
+    ("1/m",    [0, -1, 0, 0]),
+    ("s",      [0, 0, 1, 0]),
+    ("m/s",    [0, 1, -1, 0]),
+    ("m/s2",   [0, 1, -2, 0]),
+    ("rad/s",  [0, 0, -1, 1]),
+    ("kg",     [1, 0, 0, 0]),
+    ("kg.m2",  [1, 2, 0, 0]),
+    ("kg/m3",  [1, -3, 0, 0]),
+    ("Pa",     [1, -1, -2, 0]),
+    ("N",      [1, 1, -2, 0]),
+    ("N.m",    [1, 2, -2, 0]),
+    ("N.s/m2", [1, -1, -1, 0]),
+    ("J",      [1, 2, -2, 0]),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn names_are_unique_and_units_defined() {
+        let variables = all();
+        let names: HashSet<String> = variables.iter().map(Variable::to_string).collect();
+        assert_eq!(names.len(), variables.len());
+        for row in ROWS {
+            assert!(row.unit.is_empty() || UNITS.iter().any(|(name, _)| *name == row.unit), "{}", row.unit);
+        }
+    }
+
+    #[test]
+    fn dependencies_name_rows() {
+        for row in ROWS {
+            let (Output(_, initially) | IntegerOutput(_, initially)) = row.slot else { continue };
+            let Initially::AllBut(names) = initially else { continue };
+            for name in names {
+                assert!(ROWS.iter().any(|row| row.name == *name), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_set_is_read_back_and_reaches_nothing_else() {
+        for variable in all().iter().filter(|variable| !variable.is_output()) {
+            let (mut parameters, mut inputs) = (Parameters::default(), Inputs::default());
+            let value = if variable.given(&mut parameters, &mut inputs) == Some(1.0) { 0.0 } else { 1.0 };
+            variable.set(&mut parameters, &mut inputs, value);
+            let (mut start, mut rest) = (Parameters::default(), Inputs::default());
+            for other in all() {
+                let (now, before) = (other.given(&mut parameters, &mut inputs), other.given(&mut start, &mut rest));
+                let same_element = other.to_string() == variable.to_string();
+                assert_eq!(now != before, same_element, "{variable} and {other}");
+            }
+            assert_eq!(variable.given(&mut parameters, &mut inputs), Some(value));
+        }
+    }
+
+    #[test]
+    fn the_start_values_are_allowed() {
+        for variable in all() {
+            if let Some(start) = variable.given(&mut Parameters::default(), &mut Inputs::default()) {
+                assert!(variable.allowed().contains(start), "{variable}");
+            }
+        }
+    }
+}
