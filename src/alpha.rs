@@ -110,11 +110,17 @@ impl Scheme {
     }
 
     /// The history after steps of `dt` for steps of `new`: the rates move with their shift. `dt` = 0 is the start of a
-    /// motion, where they are the true ones.
+    /// motion, where they are the true ones; its jerk counts up to the size that steps of `new` can resolve.
     pub fn rebased(&self, old: &Motion, dt: f64, new: f64) -> Motion {
         let [first, second, value] = self.shift();
         let (by, by2) = (new - dt, new * new - dt * dt);
-        let Motion { velocity, acceleration, jerk } = *old;
+        let Motion { velocity, acceleration, mut jerk } = *old;
+        if dt == 0.0 {
+            // a motion that the step resolves changes by no more than itself; the jerk of what decays within the step (stiff
+            // Kelvin-Voigt damping) says nothing about its end
+            let resolved = (acceleration.value.norm() + velocity.value.norm() / new) / new;
+            jerk *= (resolved / jerk.norm()).min(1.0);
+        }
         Motion {
             velocity: Rate {
                 auxiliary: velocity.auxiliary + acceleration.value * (first * by) + jerk * (second * by2),
@@ -150,6 +156,16 @@ mod tests {
         let dx = Vector3::new(1.0, 2.0, 3.0);
         let rate = Scheme::BACKWARD_EULER.rate(&junk, &dx, 0.5);
         assert_eq!(rate.value, dx / 0.5);
+    }
+
+    #[test]
+    fn a_start_is_not_moved_by_a_jerk_the_step_cannot_resolve() {
+        // of what decays 1e6 times faster than the step: v = 0, a = 1, ȧ = −λ a
+        let (dt, decay) = (1e-2, 1e8);
+        let start = Motion::starting(Vector3::zeros(), Vector3::x(), -Vector3::x() * decay);
+        let moved = Scheme::from_spectral_radius(0.5).rebased(&start, 0.0, dt);
+        assert!(moved.velocity.auxiliary.norm() < dt && moved.velocity.value.norm() < dt, "{moved:?}");
+        assert!((moved.acceleration.auxiliary - Vector3::x()).norm() < 1.0, "{moved:?}");
     }
 
     #[test]
