@@ -194,7 +194,7 @@ fn the_energy_balance_closes_at_second_order() {
     // released into gravity and a constant load on the tip, on a base at rest and on one that is shaken; Kelvin-Voigt damping,
     // drag and the body on the tip take part. The next order in Δt is what the tolerance of the slope allows for.
     let still = Boundary { base: Base::at_rest(Vector3::zeros(), along_x()), ..shaken(0.0) };
-    let mesh = bent_and_twisted(8, 4);
+    let mesh = bent_and_twisted(16, 4);
     let steps = [1e-3, 5e-4, 2.5e-4];
     for row in [Row::Rotations, Row::Positions] {
         for boundary in [&|_| still, &shaken as &dyn Fn(f64) -> Boundary] {
