@@ -149,3 +149,17 @@ pub fn fitted_order(x: &[f64], y: &[f64]) -> f64 {
     let covariance: f64 = x.iter().zip(y).map(|(x, y)| (x.ln() - x_mean) * (y.ln() - y_mean)).sum();
     covariance / x.iter().map(|x| (x.ln() - x_mean).powi(2)).sum::<f64>()
 }
+
+/// Polynomial from 0 to 1 whose first four derivatives vanish at both ends, with its first two derivatives.
+pub fn ramp(x: f64) -> [f64; 3] {
+    if x <= 0.0 {
+        return [0.0; 3];
+    }
+    if x >= 1.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let y = 1.0 - x;
+    let value = x.powi(5) * (126.0 - 420.0 * x + 540.0 * x * x - 315.0 * x.powi(3) + 70.0 * x.powi(4));
+    let slope = 630.0 * (x * y).powi(4);
+    [value, slope, 2520.0 * (x * y).powi(3) * (1.0 - 2.0 * x)]
+}
