@@ -23,7 +23,7 @@ const FEED_TIME: f64 = 0.1;
 /// The same in communication steps, so that the feedback is far from its stability limit of two steps.
 const FEED_STEPS: f64 = 10.0;
 /// Memory of the tracker that derives a twist from poses, s.
-const TRACK_TIME: f64 = 0.02;
+const TRACK_TIME: f64 = 0.01;
 /// The same in communication steps.
 const TRACK_STEPS: f64 = 1.5;
 
