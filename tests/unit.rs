@@ -134,13 +134,13 @@ fn every_base_motion_follows_what_it_is_given() {
             let (x, v) = motion((i + 1) as f64 * h);
             let speed = 0.02 * TAU / period;
             // 2 % of the amplitude from extrapolating over a hundredth of a period; the derived twist adds its tracker's delay
-            let part = if base_motion == 1 { 0.03 } else { 0.02 };
+            let (part, rate) = if base_motion == 1 { (0.03, 0.08) } else { (0.02, 0.05) };
             assert!(
                 (outputs.stations[0].y - x).abs() < part * 0.02,
                 "base.motion {base_motion}, step {i}: {}",
                 outputs.stations[0].y - x
             );
-            assert!((outputs.tip_velocity.y - v).abs() < 0.05 * speed, "base.motion {base_motion}, step {i}");
+            assert!((outputs.tip_velocity.y - v).abs() < rate * speed, "base.motion {base_motion}, step {i}");
         }
     }
 }
