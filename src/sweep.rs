@@ -203,22 +203,30 @@ impl Sweep {
     /// # Errors
     /// [`Singular`] names the first cell, seen from the tip, that cannot be solved.
     pub fn solve(&mut self, system: &System) -> Result<(), Singular> {
-        match (self.rule.stages, system.extensible) {
-            (1, false) => self.eliminate::<1, 1>(system)?,
-            (2, false) => self.eliminate::<2, 2>(system)?,
-            (3, false) => self.eliminate::<3, 3>(system)?,
-            (_, false) => self.eliminate::<4, 4>(system)?,
-            (1, true) => self.eliminate::<1, 2>(system)?,
-            (2, true) => self.eliminate::<2, 4>(system)?,
-            (3, true) => self.eliminate::<3, 6>(system)?,
-            (_, true) => self.eliminate::<4, 8>(system)?,
-        }
+        self.eliminate(system)?;
         self.substitute(system);
         Ok(())
     }
 
-    /// From the tip to the base: P and p at every node, and the gain of every cell. `B` is `S`, or 2 `S` if extensible.
-    fn eliminate<const S: usize, const B: usize>(&mut self, system: &System) -> Result<(), Singular> {
+    /// From the tip to the base: P and p at every node, and the gain of every cell.
+    ///
+    /// # Errors
+    /// [`Singular`] as for [`Sweep::solve`].
+    pub fn eliminate(&mut self, system: &System) -> Result<(), Singular> {
+        match (self.rule.stages, system.extensible) {
+            (1, false) => self.eliminate_cells::<1, 1>(system),
+            (2, false) => self.eliminate_cells::<2, 2>(system),
+            (3, false) => self.eliminate_cells::<3, 3>(system),
+            (_, false) => self.eliminate_cells::<4, 4>(system),
+            (1, true) => self.eliminate_cells::<1, 2>(system),
+            (2, true) => self.eliminate_cells::<2, 4>(system),
+            (3, true) => self.eliminate_cells::<3, 6>(system),
+            (_, true) => self.eliminate_cells::<4, 8>(system),
+        }
+    }
+
+    /// `S` stages; `B` is `S`, or 2 `S` if extensible.
+    fn eliminate_cells<const S: usize, const B: usize>(&mut self, system: &System) -> Result<(), Singular> {
         let (a, b) = (&self.rule.a, &self.rule.b);
         let cells = system.cells.len();
         self.relations[cells] = system.tip;
@@ -335,8 +343,8 @@ impl Sweep {
         Ok(())
     }
 
-    /// From the base to the tip: the increments.
-    fn substitute(&mut self, system: &System) {
+    /// From the base to the tip: the increments, for the correction `system.base` and the residuals that were eliminated.
+    pub fn substitute(&mut self, system: &System) {
         let (a, b) = (&self.rule.a, &self.rule.b);
         let stages = self.rule.stages;
         let size = 3 * self.blocks;
