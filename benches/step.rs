@@ -14,11 +14,15 @@ mod full;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::fmi2::host::Fmu;
+use cosserat_rod::fmi2::variables::Kind;
 use cosserat_rod::mesh::Mesh;
+use cosserat_rod::package;
 use cosserat_rod::pose::{Base, Boundary, Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::sweep::{Sweep, System};
+use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use full::Full;
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
@@ -138,6 +142,62 @@ fn sweep_and_lu(iteration: &mut Iteration, cells: usize) -> (f64, f64) {
     (sweep, median((0..5).map(sample).collect()))
 }
 
+/// Seconds of a communication step of the smallest rod at rest: by the library, by `fmi2DoStep`, and by setting the 19 inputs, the
+/// step and getting 25 outputs. Medians of many, in turn.
+fn interface() -> Result<[f64; 3], Box<dyn std::error::Error>> {
+    const STEP: f64 = 1e-3;
+    let fmu = Fmu::from_library(&package::library()?)?;
+    let slave = fmu.instantiate("rod", false)?;
+    let integer = |name| fmu.description.reference(name, Kind::Integer);
+    slave.set_integer(&[integer("cells")?, integer("stages")?], &[1, 1])?;
+    let real = |names: &[&str]| -> Result<Vec<_>, _> {
+        let mut all = Vec::new();
+        for name in names {
+            match name.strip_suffix("orientation") {
+                Some(_) => all.extend(fmu.description.array::<4>(name)?),
+                None => all.extend(fmu.description.array::<3>(name)?),
+            }
+        }
+        Ok::<_, cosserat_rod::fmi2::host::Error>(all)
+    };
+    let base = ["base.position", "base.orientation", "base.velocity", "base.angular_velocity"];
+    let inputs = real(&[&base[..], &["tip.force", "tip.moment"]].concat())?;
+    let tip = ["tip.position", "tip.orientation", "tip.velocity", "tip.angular_velocity"];
+    let reaction = ["base.reaction_force", "base.reaction_moment", "station[6].position", "station[11].position"];
+    let outputs = real(&[&tip[..], &reaction].concat())?;
+    assert_eq!((inputs.len(), outputs.len()), (19, 25));
+    let gravity = fmu.description.array::<3>("gravity")?;
+    slave.set_real(&gravity, &[0.0; 3])?;
+    slave.setup_experiment(0.0, None, None)?;
+    slave.enter_initialization_mode()?;
+    slave.exit_initialization_mode()?;
+    let mut values = [0.0; 19];
+    slave.get_real(&inputs, &mut values)?;
+
+    let parameters = Parameters { cells: 1, stages: 1, gravity: Vector3::zeros(), ..Parameters::default() };
+    let mut unit = Unit::new(&parameters, &Inputs::default(), None)?;
+    let mut results = [Vec::new(), Vec::new(), Vec::new()];
+    let (mut time, mut got) = (0.0, [0.0; 25]);
+    for _ in 0..2000 {
+        let start = Instant::now();
+        black_box(unit.advance(&Inputs::default(), STEP)?);
+        let library = start.elapsed();
+        let start = Instant::now();
+        slave.do_step(time, STEP)?;
+        let bare = start.elapsed();
+        let start = Instant::now();
+        slave.set_real(&inputs, &values)?;
+        slave.do_step(time + STEP, STEP)?;
+        slave.get_real(&outputs, &mut got)?;
+        let whole = start.elapsed();
+        time += 2.0 * STEP;
+        for (result, elapsed) in results.iter_mut().zip([library, bare, whole]) {
+            result.push(elapsed.as_secs_f64());
+        }
+    }
+    Ok(results.map(median))
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(at) = arguments.iter().position(|argument| argument == "--count") {
@@ -184,5 +244,14 @@ fn main() {
             let (sweep, lu) = sweep_and_lu(&mut iteration, cells);
             println!("{stages:>6} {cells:>7} {:>10.1} {:>10.1} {:>7.1}", sweep * 1e6, lu * 1e6, lu / sweep);
         }
+    }
+
+    match interface() {
+        Ok([library, bare, whole]) => {
+            println!("\nA communication step of one box cell at rest, µs");
+            println!("library {:.2}, fmi2DoStep {:.2} (+{:.2})", library * 1e6, bare * 1e6, (bare - library) * 1e6);
+            println!("set 19 inputs, fmi2DoStep, get 25 outputs {:.2} (+{:.2})", whole * 1e6, (whole - library) * 1e6);
+        }
+        Err(error) => println!("\nThe C interface was not measured: {error}"),
     }
 }
