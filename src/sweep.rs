@@ -438,7 +438,13 @@ impl Sweep {
 
             let mut w_s = [Vec3::zeros(); MAX_STAGES];
             for (k, point) in points.iter().enumerate() {
-                increments[k].phi = phi_0 + point.spin * sum(-point.e_log, &a[k], &strain);
+                let log = sum(-point.e_log, &a[k], &strain);
+                increments[k].phi = phi_0 + point.spin * log;
+                // by its law: from the balance it would be a difference of larger moments where a cell is soft and heavy
+                increments[k].m = point.law_strain * strain[k]
+                    + point.law_log * log
+                    + point.law_phi * increments[k].phi
+                    + point.e_law;
                 w_s[k] = if system.extensible { unknown(stages + k) } else { point.w_phi * increments[k].phi };
             }
             let phi_1 = phi_0 + ends.spin * sum(-ends.e_log, b, &strain);
@@ -451,13 +457,8 @@ impl Sweep {
             let rest = |k: usize| -> [f64; MAX_STAGES] { from_fn(|l| a[k][l] - b[l]) };
             let n_s: [Vec3; MAX_STAGES] =
                 from_fn(|l| if l < stages { increments[l].w * system.mass } else { Vec3::zeros() });
-            let mut m_s = [Vec3::zeros(); MAX_STAGES];
             for (k, point) in points.iter().enumerate() {
                 increments[k].n = sum(n_1 - point.e_n, &rest(k), &n_s);
-                m_s[k] = point.m_phi * increments[k].phi + point.m_n * increments[k].n;
-            }
-            for (k, point) in points.iter().enumerate() {
-                increments[k].m = sum(m_1 - point.e_m, &rest(k), &m_s);
             }
             self.nodes[cell + 1] = Increment { w: w_1, phi: phi_1, n: n_1, m: m_1 };
         }
