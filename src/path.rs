@@ -18,12 +18,12 @@ use nalgebra::{Matrix3, Vector3};
 type Vec3 = Vector3<f64>;
 type Mat3 = Matrix3<f64>;
 
-/// Shortest time over which a distance between samples and path is fed in, s.
-const FEED_TIME: f64 = 0.1;
+/// Shortest time over which a distance between samples and path is fed in, s; with a derived twist, whose own errors it corrects.
+const FEED_TIME: [f64; 2] = [0.1, 0.02];
 /// The same in communication steps, so that the feedback is far from its stability limit of two steps.
-const FEED_STEPS: f64 = 10.0;
+const FEED_STEPS: [f64; 2] = [10.0, 5.0];
 /// Memory of the tracker that derives a twist from poses, s.
-const TRACK_TIME: f64 = 0.02;
+const TRACK_TIME: f64 = 0.01;
 /// The same in communication steps.
 const TRACK_STEPS: f64 = 1.5;
 
@@ -146,7 +146,8 @@ impl Path {
         if self.given == Given::Twist {
             away = Twist::default();
         }
-        let feed = 1.0 / FEED_TIME.max(FEED_STEPS * step);
+        let derived = usize::from(self.given == Given::Pose);
+        let feed = 1.0 / FEED_TIME[derived].max(FEED_STEPS[derived] * step);
         let target = next.last.twist().plus(step, next.rate).plus(feed, away);
         let now = Twist { linear: self.base.velocity, angular: self.base.angular_velocity };
         let mean = target.plus(-1.0, now).map(|change| change / step);

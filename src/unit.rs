@@ -250,6 +250,9 @@ impl fmt::Display for Warning {
 /// communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
+/// Internal steps in a communication step beyond which the host has asked for something else than it wants.
+const MAX_INTERNAL_STEPS: f64 = 1e7;
+
 /// Halvings of an internal step before it is given up.
 const MAX_HALVINGS: u32 = 12;
 
@@ -519,11 +522,15 @@ impl Unit {
                 allowed: "finite and > 0",
             });
         }
+        // a host's round-off does not cost a step
+        let steps = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
+        if steps > MAX_INTERNAL_STEPS {
+            let allowed = "0 (automatic), or at least a ten-millionth of the communication step";
+            return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
+        }
         let segment = self.path.segment(&inputs.sample(), step_size);
         self.backup.copy_from(&self.stepper.state);
         let (energy, counts) = (self.energy, self.counts);
-        // a host's round-off does not cost a step
-        let steps = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
         let dt = step_size / steps;
         let mut i = 0.0;
         while i < steps {

@@ -1,6 +1,9 @@
 //! Orders of convergence, fitted: in time 2 at every spectral radius below 1, in space 2s; tip position, tip velocity and the
 //! reaction at the base, each against its own refined solution.
 
+mod common;
+
+use common::ramp;
 use cosserat_rod::alpha::Scheme;
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Base, Boundary, Row, State};
@@ -13,20 +16,6 @@ use std::f64::consts::PI;
 type Vec3 = Vector3<f64>;
 
 const GRAVITY: f64 = 9.81;
-
-/// Polynomial from 0 to 1 whose first four derivatives vanish at both ends, with its first two derivatives.
-fn ramp(x: f64) -> [f64; 3] {
-    if x <= 0.0 {
-        return [0.0; 3];
-    }
-    if x >= 1.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    let y = 1.0 - x;
-    let value = x.powi(5) * (126.0 - 420.0 * x + 540.0 * x * x - 315.0 * x.powi(3) + 70.0 * x.powi(4));
-    let slope = 630.0 * (x * y).powi(4);
-    [value, slope, 2520.0 * (x * y).powi(3) * (1.0 - 2.0 * x)]
-}
 
 /// The rotation by a half turn about x: the rod hangs along −z.
 fn hanging() -> Matrix3<f64> {

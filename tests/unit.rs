@@ -1,0 +1,213 @@
+//! The unit between communication points: what the host samples becomes one smooth motion of the base.
+
+use cosserat_rod::unit::{Error, Inputs, Outputs, Parameters, Unit};
+use nalgebra::{Vector3, Vector4};
+use std::f64::consts::TAU;
+
+type Vec3 = Vector3<f64>;
+
+/// A short steel rod: it follows its base like a rigid body, so that its reaction shows the acceleration of the path.
+fn stiff() -> Parameters {
+    Parameters {
+        length: 0.2,
+        radius: 0.004,
+        density: 7850.0,
+        youngs_modulus: 2e11,
+        shear_modulus: 8e10,
+        gravity: Vec3::zeros(),
+        cells: 2,
+        stages: 2,
+        ..Parameters::default()
+    }
+}
+
+/// The outputs at the communication points of `steps` steps of `h` s under a position and velocity of the base along y.
+fn shake(parameters: &Parameters, h: f64, steps: usize, motion: impl Fn(f64) -> (f64, f64)) -> Vec<Outputs> {
+    let inputs = |t: f64| {
+        let (x, v) = motion(t);
+        Inputs { base_position: Vec3::y() * x, base_velocity: Vec3::y() * v, ..Inputs::default() }
+    };
+    let mut unit = Unit::new(parameters, &inputs(0.0), None).unwrap();
+    let step = |i: usize| {
+        unit.advance(&inputs(i as f64 * h), h).unwrap();
+        unit.outputs().clone()
+    };
+    (0..steps).map(step).collect()
+}
+
+fn mass(parameters: &Parameters) -> f64 {
+    let rod = parameters.rod();
+    rod.mass_per_length * parameters.length
+}
+
+#[test]
+fn a_constant_acceleration_gives_a_reaction_without_a_flip() {
+    let (parameters, acceleration) = (Parameters { step: 5e-4, ..stiff() }, 2.0);
+    let expected = -mass(&parameters) * acceleration;
+    for h in [0.02, 0.01, 0.005] {
+        let steps = shake(&parameters, h, (0.4 / h) as usize, |t| (0.5 * acceleration * t * t, acceleration * t));
+        for (i, outputs) in steps.iter().enumerate() {
+            let reaction = outputs.base_reaction_force.y / expected;
+            // the host's velocity tells of the acceleration only at the second point
+            assert!(i == 0 || reaction > 0.0, "H = {h}, step {i}: {reaction}");
+        }
+        // what was missed at first is fed in over 0.1 s and more
+        let last = steps[steps.len() - 1].base_reaction_force.y / expected;
+        assert!((last - 1.0).abs() < 0.02, "H = {h}: {last}");
+    }
+}
+
+/// Amplitude that fades in over one period, so that the sine starts smoothly; position and velocity.
+fn sine(amplitude: f64, period: f64) -> impl Fn(f64) -> (f64, f64) {
+    move |t| {
+        let x = t / period;
+        let (fade, slope) = if x < 1.0 {
+            (x.powi(3) * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * (1.0 - x)).powi(2))
+        } else {
+            (1.0, 0.0)
+        };
+        let (sin, cos) = (TAU * x).sin_cos();
+        (amplitude * fade * sin, amplitude * (slope * sin + fade * TAU * cos) / period)
+    }
+}
+
+#[test]
+fn the_reaction_to_a_sampled_sine_converges_and_does_not_flip() {
+    let period = 0.5;
+    let parameters = Parameters { step: 1e-3, ..stiff() };
+    let per_period = [20, 40, 80];
+    let scale = mass(&parameters) * 0.02 * (TAU / period).powi(2);
+    let run = |n: usize| shake(&parameters, period / n as f64, 4 * n, sine(0.02, period));
+    let reference = run(640);
+    let mut errors = Vec::new();
+    for n in per_period {
+        let steps = run(n);
+        let (mut worst, mut flips) = (0.0f64, 0);
+        let mut before = 0.0;
+        // from the second period on the amplitude is constant
+        for i in n..steps.len() {
+            let now = steps[i].base_reaction_force.y;
+            let exact = reference[(i + 1) * 640 / n - 1].base_reaction_force.y;
+            worst = worst.max((now - exact).abs() / scale);
+            flips += usize::from(now * before < 0.0);
+            before = now;
+        }
+        // two zeros a period, in three periods
+        assert!(flips <= 6, "{n} steps a period: {flips} changes of sign");
+        errors.push(worst);
+    }
+    assert!(errors[0] < 0.25 && errors[1] < 0.55 * errors[0] && errors[2] < 0.55 * errors[1], "{errors:?}");
+}
+
+#[test]
+fn positions_rounded_as_in_a_table_do_not_shake_the_reaction() {
+    let rounded = |x: f64| (x * 1e6).round() / 1e6;
+    let motion = sine(0.02, 0.5);
+    for (base_motion, bound) in [(0, 0.005), (1, 0.02)] {
+        for h in [0.01, 0.002] {
+            let parameters = Parameters { step: 1e-3, base_motion, ..stiff() };
+            let scale = mass(&parameters) * 0.02 * (TAU / 0.5f64).powi(2);
+            let steps = (1.0 / h) as usize;
+            let smooth = shake(&parameters, h, steps, &motion);
+            let coarse = shake(&parameters, h, steps, |t| (rounded(motion(t).0), motion(t).1));
+            for (a, b) in smooth.iter().zip(&coarse) {
+                let difference = (a.base_reaction_force - b.base_reaction_force).norm() / scale;
+                assert!(difference < bound, "base.motion {base_motion}, H = {h}: {difference}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_base_motion_follows_what_it_is_given() {
+    let (period, h) = (0.5, 0.005);
+    let motion = sine(0.02, period);
+    for base_motion in 0..=2 {
+        let parameters = Parameters { step: 1e-3, base_motion, ..stiff() };
+        // what is not to be used is wrong on purpose
+        let steps = shake(&parameters, h, 300, |t| match base_motion {
+            0 => motion(t),
+            1 => (motion(t).0, 0.0),
+            _ => (0.0, motion(t).1),
+        });
+        for (i, outputs) in steps.iter().enumerate() {
+            let (x, v) = motion((i + 1) as f64 * h);
+            let speed = 0.02 * TAU / period;
+            // 2 % of the amplitude from extrapolating over a hundredth of a period; the derived twist adds its tracker's delay
+            let (part, rate) = if base_motion == 1 { (0.03, 0.08) } else { (0.02, 0.05) };
+            assert!(
+                (outputs.stations[0].y - x).abs() < part * 0.02,
+                "base.motion {base_motion}, step {i}: {}",
+                outputs.stations[0].y - x
+            );
+            assert!((outputs.tip_velocity.y - v).abs() < rate * speed, "base.motion {base_motion}, step {i}");
+        }
+    }
+}
+
+#[test]
+fn a_pose_that_contradicts_its_twist_is_warned_of_once_and_followed_slowly() {
+    let mut unit = Unit::new(&stiff(), &Inputs::default(), None).unwrap();
+    let inputs = Inputs { base_position: Vec3::y() * 0.1, ..Inputs::default() };
+    let warnings: Vec<String> =
+        (0..200).filter_map(|_| unit.advance(&inputs, 0.01).unwrap()).map(|warning| warning.to_string()).collect();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(warnings[0].contains("base.position") && warnings[0].contains("base.velocity"), "{warnings:?}");
+    assert!((unit.outputs().stations[0].y - 0.1).abs() < 1e-3);
+}
+
+#[test]
+fn a_refused_step_changes_nothing() {
+    let parameters = Parameters { step: 0.01, ..Parameters::default() };
+    let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+    unit.advance(&Inputs::default(), 0.05).unwrap();
+    let before = format!("{unit:?}");
+    let bad = [
+        (Inputs { base_position: Vec3::new(f64::NAN, 0.0, 0.0), ..Inputs::default() }, 0.05, "base.position[1]"),
+        (Inputs { tip_force: Vec3::new(0.0, 0.0, f64::INFINITY), ..Inputs::default() }, 0.05, "tip.force[3]"),
+        (Inputs { base_orientation: Vector4::zeros(), ..Inputs::default() }, 0.05, "base.orientation"),
+        (Inputs::default(), 0.0, "step size"),
+        (Inputs::default(), 1e8, "step"),
+    ];
+    for (inputs, step, name) in bad {
+        let error = unit.advance(&inputs, step).unwrap_err().to_string();
+        assert!(error.contains(name), "{error}");
+        assert_eq!(format!("{unit:?}"), before);
+    }
+    // one that Newton cannot take: a force no step can follow
+    let mut repeated = unit.clone();
+    let violent = Inputs { tip_force: Vec3::y() * 1e150, ..Inputs::default() };
+    assert!(matches!(unit.advance(&violent, 0.05), Err(Error::Diverged { .. })));
+    unit.advance(&Inputs::default(), 0.05).unwrap();
+    repeated.advance(&Inputs::default(), 0.05).unwrap();
+    assert_eq!(unit.outputs(), repeated.outputs());
+}
+
+#[test]
+fn gravity_changes_from_the_next_step_on() {
+    let mut unit = Unit::new(&Parameters::default(), &Inputs::default(), None).unwrap();
+    unit.set_gravity(Vec3::z() * 9.81);
+    for _ in 0..20 {
+        unit.advance(&Inputs::default(), 0.01).unwrap();
+    }
+    assert!(unit.outputs().tip_position.z > 0.1, "{}", unit.outputs().tip_position);
+}
+
+#[test]
+fn an_equilibrium_stays_and_an_unstable_one_is_refused() {
+    let resting = Parameters { start_in_equilibrium: true, ..Parameters::default() };
+    let mut unit = Unit::new(&resting, &Inputs::default(), None).unwrap();
+    let start = unit.outputs().clone();
+    for _ in 0..50 {
+        unit.advance(&Inputs::default(), 0.02).unwrap();
+    }
+    let moved = (unit.outputs().tip_position - start.tip_position).norm();
+    assert!(moved < 1e-9, "{moved}");
+    let weight = mass(&resting) * 9.81;
+    assert!((unit.outputs().base_reaction_force.z + weight).abs() < 1e-9 * weight);
+
+    // standing on its clamp, this rod is far longer than it can carry (w L³/EI = 346, the limit is 7.84)
+    let standing = Inputs { base_orientation: Vector4::new(1.0, 0.0, 0.0, 0.0), ..Inputs::default() };
+    let error = Unit::new(&resting, &standing, None).unwrap_err();
+    assert!(matches!(error, Error::UnstableEquilibrium { .. }), "{error}");
+}
