@@ -1,4 +1,43 @@
-//! One elastic rod as an FMI 2.0 co-simulation unit.
+//! One elastic rod (cable, hose, umbilical, catheter, spring, hair) as an FMI 2.0 co-simulation unit.
+//!
+//! The rod is the dynamic Cosserat rod of Sobottka, Lay and Weber (*Stable Integration of the Dynamic Cosserat Equations with
+//! Application to Hair Modeling*, 2008): a two-point boundary value problem in space, integrated in time by the generalized-α
+//! method and solved by Newton's method along the whole rod at once. "eq" and "section" in these pages are that paper's.
+//!
+//! # Layers
+//!
+//! The modules stand in the order of reading, which is the order of dependence:
+//!
+//! ```text
+//! host =C=> fmi2 -> unit -> {path, modes, stepper} -> {alpha, sweep, pose -> rod -> mesh -> so3}
+//! ```
+//!
+//! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
+//! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command line, and
+//!    the rest compiles.
+//! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread, clock or
+//!    mutable static in the library.
+//! 4. [`sweep`] knows blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] knows which unknowns a section has.
+//! 5. [`pose::State`] is plain data; everything a later step depends on is in it. Rebuilding the storage around it changes no bit
+//!    of any result. Same inputs, same bits.
+//! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry with
+//!    smaller steps lives in [`mod@unit`], never in Newton.
+//!
+//! # Notation
+//!
+//! SI units. The world frame is right-handed; body-frame components refer to R = [d₁ d₂ d₃], body to world, d₃ along the rod.
+//! `_s` and `_t` are derivatives by arc length and time.
+//!
+//! | symbol | identifier | unit | meaning |
+//! |---|---|---|---|
+//! | r, R | `position`, `rotation` | m, – | centreline; orientation of the section |
+//! | u, ω | `velocity`, `omega` | m/s, rad/s | of the section; ω in the body frame |
+//! | κ, κ̂ | `kappa`, `kappa_rest` | 1/m | (RᵀR_s)^∨: bending 1, 2 and twist 3; of the unstressed rod |
+//! | n, m | `force`, `moment` | N, N·m | what the part s⁺ exerts on the part s⁻; the reaction is (n, m) at s = 0 |
+//! | K, C | `stiffness`, `compliance` | N·m², 1/N | diag(EI₁, EI₂, GJ); diag(1/GA, 1/GA, 1/EA) |
+//! | ρA, ρI | `mass_per_length`, `inertia_per_length` | kg/m, kg·m | |
+//! | α, β, γ | `alpha`, `beta`, `gamma` | – | the time scheme: α and β weigh the old end of a step, γ the new one |
+//! | h, s | `length`, `stages` | m, – | of a cell: its length, its Gauss points |
 #![deny(unsafe_code)]
 
 pub mod so3;

@@ -225,6 +225,24 @@ impl State {
         self.dt = 0.0;
     }
 
+    /// Puts the auxiliary rates where a step of `dt` s with `scheme` wants them: at a start, and where either has changed.
+    pub fn prepare(&mut self, scheme: Scheme, dt: f64) {
+        // what is first order anyway is left as it is: α + γ = 1 and β = 0 then is implicit Euler to rounding
+        if (scheme, dt) == (self.scheme, self.dt) || !scheme.is_second_order() {
+            return;
+        }
+        let (before, other) = (self.dt, self.scheme);
+        let prepared = |motion: &Motion| match before {
+            0.0 => scheme.started(motion, dt),
+            before => scheme.rebased(motion, &other, before, dt),
+        };
+        for memory in &mut self.memory {
+            memory.spin = prepared(&memory.spin);
+            memory.travel = prepared(&memory.travel);
+            memory.strain = prepared(&memory.strain);
+        }
+    }
+
     /// The section at the tip.
     pub fn tip(&self) -> &Section {
         &self.nodes[self.nodes.len() - 1]
@@ -470,18 +488,7 @@ impl Law {
     }
 }
 
-/// Sizes that make residuals and increments numbers of order one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scales {
-    /// Of w, m or m/s².
-    pub w: f64,
-    /// Of n, N.
-    pub force: f64,
-    /// Of m, N·m.
-    pub moment: f64,
-}
-
-/// Residuals and blocks of all cells at an iterate. Returns the largest scaled residual.
+/// Residuals and blocks of all cells at an iterate.
 pub fn assemble(
     mesh: &Mesh,
     rod: &Rod,
@@ -489,9 +496,8 @@ pub fn assemble(
     state: &State,
     boundary: &Boundary,
     time: &Time,
-    scales: &Scales,
     system: &mut System,
-) -> f64 {
+) {
     let Gauss { stages, a, b, .. } = &mesh.rule;
     let stages = *stages;
     let (weight_v, weight_a) = time.weights();
@@ -500,7 +506,6 @@ pub fn assemble(
     let (rho_a, gravity) = (rod.mass_per_length, boundary.gravity);
     let rho_i = rod.inertia_per_length;
     let e_3 = Vec3::z();
-    let mut largest = 0.0f64;
 
     system.mass = match row {
         Row::Rotations => rho_a,
@@ -600,11 +605,6 @@ pub fn assemble(
             }
             point.e_n = section.force - integral(node_1.force, h, &rest, &n_s, stages);
             point.e_m = section.moment - integral(node_1.moment, h, &rest, &m_s, stages);
-            largest = largest
-                .max(point.e_log.amax())
-                .max(point.e_w.amax() / scales.w)
-                .max(point.e_n.amax() / scales.force)
-                .max(point.e_m.amax() / scales.moment);
         }
         let log_1 = so3::log_near(&node_0.rotation.tr_mul(&node_1.rotation), &node_1.turn);
         let ends: &mut CellEnds = &mut system.cells[j];
@@ -614,11 +614,6 @@ pub fn assemble(
         ends.e_w = accumulated(node_1) - integral(w_0, h, b, &w_s, stages);
         ends.e_n = node_0.force - integral(node_1.force, -h, b, &n_s, stages);
         ends.e_m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
-        largest = largest
-            .max(ends.e_log.amax())
-            .max(ends.e_w.amax() / scales.w)
-            .max(ends.e_n.amax() / scales.force)
-            .max(ends.e_m.amax() / scales.moment);
     }
 
     // the base is where its path says
@@ -646,21 +641,14 @@ pub fn assemble(
         system.tip.n += (gravity - a_tip) * rod.tip_mass;
         system.tip.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
     }
-    if rod.tip_inertia > 0.0 {
-        if let Time::Step { .. } = time {
-            let theta = so3::log(&old_tip.rotation.tr_mul(&tip.rotation));
-            let R = tip.rotation;
-            let turning = R * time.motion(&past.spin, &theta).acceleration.value;
-            let W = so3::inverse_right_jacobian(&theta) * R.transpose();
-            system.tip.m -= turning * rod.tip_inertia;
-            system.tip.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
-        }
+    if rod.tip_inertia > 0.0 && *time != Time::Static {
+        let theta = so3::log(&old_tip.rotation.tr_mul(&tip.rotation));
+        let R = tip.rotation;
+        let turning = R * time.motion(&past.spin, &theta).acceleration.value;
+        let W = so3::inverse_right_jacobian(&theta) * R.transpose();
+        system.tip.m -= turning * rod.tip_inertia;
+        system.tip.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
     }
-    largest
-        .max(system.base.0.amax() / scales.w)
-        .max(system.base.1.amax())
-        .max(system.tip.n.amax() / scales.force)
-        .max(system.tip.m.amax() / scales.moment)
 }
 
 /// u at the tip of an iterate, only needed where a body sits on the tip of a rod with drag. Its derivative is left out of the

@@ -4,9 +4,9 @@
 
 use crate::alpha::{Motion, Scheme};
 use crate::mesh::Mesh;
-use crate::pose::{self, Boundary, Row, Scales, State, Time};
+use crate::pose::{self, Boundary, Row, State, Time};
 use crate::rod::Rod;
-use crate::sweep::{CellEnds, Increment, Point, Relation, Singular, Sweep, System};
+use crate::sweep::{Increment, Scales, Singular, Sweep, System};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -113,14 +113,7 @@ impl Stepper {
     /// A rod in the given state.
     pub fn new(mesh: Mesh, rod: Rod, state: State) -> Self {
         let extensible = rod.is_extensible();
-        let system = System {
-            points: vec![Point::default(); mesh.points()],
-            cells: vec![CellEnds::default(); mesh.cells.len()],
-            mass: 0.0,
-            extensible,
-            base: Default::default(),
-            tip: Relation::default(),
-        };
+        let system = System::new(mesh.cells.len(), &mesh.rule, extensible);
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
         Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep }
     }
@@ -183,25 +176,15 @@ impl Stepper {
             .map_err(|diverged| Diverged { iterations: lost + diverged.iterations, ..diverged })
     }
 
-    /// One step of `dt` s to `boundary` with a given scheme and acceleration row.
+    /// One step of `dt` s to `boundary` with a given scheme and acceleration row; a rod that shears or stretches has only
+    /// [`Row::Positions`].
     ///
     /// # Errors
     /// [`Diverged`]; the state is as before.
     pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
+        let row = if self.rod.is_extensible() { Row::Positions } else { row };
         self.old.copy_from(&self.state);
-        // what is first order anyway is left as it is: α + γ = 1 and β = 0 then is implicit Euler to rounding
-        if (scheme, dt) != (self.state.scheme, self.state.dt) && scheme.is_second_order() {
-            let State { dt: before, scheme: other, .. } = &self.state;
-            let rebased = |motion: &Motion| match *before {
-                0.0 => scheme.started(motion, dt),
-                before => scheme.rebased(motion, other, before, dt),
-            };
-            for memory in &mut self.old.memory {
-                memory.spin = rebased(&memory.spin);
-                memory.travel = rebased(&memory.travel);
-                memory.strain = rebased(&memory.strain);
-            }
-        }
+        self.old.prepare(scheme, dt);
         self.solve(boundary, &Time::Step { scheme, dt, row })
     }
 
@@ -250,7 +233,8 @@ impl Stepper {
         let mut residual = f64::INFINITY;
         for iteration in 1..=max_iterations {
             let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
-            residual = pose::assemble(mesh, rod, old, trial, boundary, time, &scales, system);
+            pose::assemble(mesh, rod, old, trial, boundary, time, system);
+            residual = system.residual(&scales);
             if !residual.is_finite() {
                 return Err(diverged(residual, Reason::NotFinite));
             }
@@ -324,11 +308,14 @@ impl Stepper {
         boundary: &Boundary,
         load: impl Fn(&Mesh, &Rod, &State, &mut System),
     ) -> Result<(&[Increment], &[Increment]), Diverged> {
-        let (scales, _) = scales(&self.mesh, &self.rod, &self.state, boundary, &Time::Static);
         let Self { mesh, rod, state, system, sweep, .. } = self;
-        let residual = pose::assemble(mesh, rod, state, state, boundary, &Time::Static, &scales, system);
+        pose::assemble(mesh, rod, state, state, boundary, &Time::Static, system);
         load(mesh, rod, state, system);
-        let singular = |s: Singular| Diverged { iterations: 1, residual, reason: Reason::Singular { cell: s.cell } };
+        let singular = |s: Singular| Diverged {
+            iterations: 1,
+            residual: f64::INFINITY,
+            reason: Reason::Singular { cell: s.cell },
+        };
         sweep.solve(system).map_err(singular)?;
         Ok((&sweep.nodes, &sweep.points))
     }

@@ -125,6 +125,43 @@ pub struct System {
     pub tip: Relation,
 }
 
+/// Sizes that make residuals and increments numbers of order one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scales {
+    /// Of w, m or m/s².
+    pub w: f64,
+    /// Of n, N.
+    pub force: f64,
+    /// Of m, N·m.
+    pub moment: f64,
+}
+
+impl System {
+    /// Room for a system of `cells` cells of `rule`, with shear and stretch or without.
+    pub fn new(cells: usize, rule: &Gauss, extensible: bool) -> Self {
+        Self {
+            points: vec![Point::default(); cells * rule.stages],
+            cells: vec![CellEnds::default(); cells],
+            mass: 0.0,
+            extensible,
+            base: Default::default(),
+            tip: Relation::default(),
+        }
+    }
+
+    /// The largest residual, scaled.
+    pub fn residual(&self, scales: &Scales) -> f64 {
+        let size = |w: &Vec3, log: &Vec3, n: &Vec3, m: &Vec3| {
+            (w.amax() / scales.w).max(log.amax()).max(n.amax() / scales.force).max(m.amax() / scales.moment)
+        };
+        let points = self.points.iter().map(|point| size(&point.e_w, &point.e_log, &point.e_n, &point.e_m));
+        let cells = self.cells.iter().map(|ends| size(&ends.e_w, &ends.e_log, &ends.e_n, &ends.e_m));
+        let ends = size(&self.base.0, &self.base.1, &self.tip.n, &self.tip.m);
+        // a maximum would drop what is not a number
+        points.chain(cells).fold(ends, |largest, x| if x <= largest { largest } else { x })
+    }
+}
+
 /// A cell's equations for its strains have no unique solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular {
@@ -132,34 +169,73 @@ pub struct Singular {
     pub cell: usize,
 }
 
-/// An affine function of a cell's `B` unknown vectors u and of w₀ and φ₀.
+/// Three affine functions of the unknowns u of a cell and of w₀ and φ₀: rows of the coefficients of u, w₀, φ₀ and 1, so that
+/// the inner loops run along them.
 #[derive(Clone, Copy)]
-struct Affine<const B: usize> {
-    u: [Mat3; B],
-    w: Mat3,
-    phi: Mat3,
-    one: Vec3,
-}
+struct Affine<const W: usize>([[f64; W]; 3]);
 
-impl<const B: usize> Affine<B> {
+/// Columns of w₀, φ₀ and the constant.
+const GAIN: usize = 7;
+
+impl<const W: usize> Affine<W> {
+    const W_0: usize = W - GAIN;
+    const PHI_0: usize = Self::W_0 + 3;
+    const ONE: usize = Self::W_0 + 6;
+
     #[inline(always)]
     fn constant(one: Vec3) -> Self {
-        Self { u: [Mat3::zeros(); B], w: Mat3::zeros(), phi: Mat3::zeros(), one }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, scale: f64, other: &Self) {
-        for (mine, theirs) in self.u.iter_mut().zip(&other.u) {
-            *mine += theirs * scale;
+        let mut f = Self([[0.0; W]; 3]);
+        for i in 0..3 {
+            f.0[i][Self::ONE] = one[i];
         }
-        self.w += other.w * scale;
-        self.phi += other.phi * scale;
-        self.one += other.one * scale;
+        f
+    }
+
+    /// Adds `matrix` to the coefficients of the vector at `column`.
+    #[inline(always)]
+    fn add_block(&mut self, column: usize, matrix: &Mat3) {
+        for i in 0..3 {
+            for j in 0..3 {
+                self.0[i][column + j] += matrix[(i, j)];
+            }
+        }
     }
 
     #[inline(always)]
-    fn times(&self, matrix: &Mat3) -> Self {
-        Self { u: from_fn(|l| matrix * self.u[l]), w: matrix * self.w, phi: matrix * self.phi, one: matrix * self.one }
+    fn add_constant(&mut self, one: &Vec3) {
+        for i in 0..3 {
+            self.0[i][Self::ONE] += one[i];
+        }
+    }
+
+    /// Adds Σ weights_l terms_l.
+    #[inline(always)]
+    fn add_sum<const S: usize>(&mut self, weights: [f64; S], terms: &[Self; S]) {
+        for i in 0..3 {
+            for c in 0..W {
+                let mut sum = self.0[i][c];
+                for l in 0..S {
+                    sum += weights[l] * terms[l].0[i][c];
+                }
+                self.0[i][c] = sum;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn subtract(&mut self, other: &Self) {
+        self.add_sum([-1.0], std::array::from_ref(other));
+    }
+
+    #[inline(always)]
+    fn add_product(&mut self, matrix: &Mat3, other: &Self) {
+        let [x, y, z] = &other.0;
+        for i in 0..3 {
+            let (by_x, by_y, by_z) = (matrix[(i, 0)], matrix[(i, 1)], matrix[(i, 2)]);
+            for c in 0..W {
+                self.0[i][c] += by_x * x[c] + by_y * y[c] + by_z * z[c];
+            }
+        }
     }
 }
 
@@ -171,16 +247,13 @@ pub struct Sweep {
     /// (n, m) as a function of (w, φ), at every node.
     relations: Vec<Relation>,
     /// u = gain (w₀, φ₀, 1), row by row, cell by cell.
-    gains: Vec<f64>,
+    gains: Vec<[f64; GAIN]>,
     scratch: Vec<f64>,
     /// Increments of the nodes after [`Sweep::solve`].
     pub nodes: Vec<Increment>,
     /// Increments of the Gauss points after [`Sweep::solve`].
     pub points: Vec<Increment>,
 }
-
-/// Columns of a gain: w₀, φ₀ and the constant.
-const GAIN: usize = 7;
 
 impl Sweep {
     /// Storage for `cells` cells of `rule`, with shear and stretch or without.
@@ -191,7 +264,7 @@ impl Sweep {
             rule: rule.clone(),
             blocks,
             relations: vec![Relation::default(); cells + 1],
-            gains: vec![0.0; cells * 3 * blocks * GAIN],
+            gains: vec![[0.0; GAIN]; cells * 3 * blocks],
             scratch: vec![0.0; 3 * blocks * (3 * blocks + GAIN)],
             nodes: vec![Increment::default(); cells + 1],
             points: vec![Increment::default(); cells * stages],
@@ -203,130 +276,133 @@ impl Sweep {
     /// # Errors
     /// [`Singular`] names the first cell, seen from the tip, that cannot be solved.
     pub fn solve(&mut self, system: &System) -> Result<(), Singular> {
-        match (self.rule.stages, system.extensible) {
-            (1, false) => self.eliminate::<1, 1>(system)?,
-            (2, false) => self.eliminate::<2, 2>(system)?,
-            (3, false) => self.eliminate::<3, 3>(system)?,
-            (_, false) => self.eliminate::<4, 4>(system)?,
-            (1, true) => self.eliminate::<1, 2>(system)?,
-            (2, true) => self.eliminate::<2, 4>(system)?,
-            (3, true) => self.eliminate::<3, 6>(system)?,
-            (_, true) => self.eliminate::<4, 8>(system)?,
-        }
+        self.eliminate(system)?;
         self.substitute(system);
         Ok(())
     }
 
-    /// From the tip to the base: P and p at every node, and the gain of every cell. `B` is `S`, or 2 `S` if extensible.
-    fn eliminate<const S: usize, const B: usize>(&mut self, system: &System) -> Result<(), Singular> {
+    /// From the tip to the base: P and p at every node, and the gain of every cell.
+    ///
+    /// # Errors
+    /// [`Singular`] as for [`Sweep::solve`].
+    pub fn eliminate(&mut self, system: &System) -> Result<(), Singular> {
+        match (self.rule.stages, system.extensible) {
+            (1, false) => self.eliminate_cells::<1, { 3 + GAIN }>(system),
+            (2, false) => self.eliminate_cells::<2, { 6 + GAIN }>(system),
+            (3, false) => self.eliminate_cells::<3, { 9 + GAIN }>(system),
+            (_, false) => self.eliminate_cells::<4, { 12 + GAIN }>(system),
+            (1, true) => self.eliminate_cells::<1, { 6 + GAIN }>(system),
+            (2, true) => self.eliminate_cells::<2, { 12 + GAIN }>(system),
+            (3, true) => self.eliminate_cells::<3, { 18 + GAIN }>(system),
+            (_, true) => self.eliminate_cells::<4, { 24 + GAIN }>(system),
+        }
+    }
+
+    /// `S` stages, `W` columns: 3 `S` unknowns, or 6 `S` if extensible, and those of the gain.
+    fn eliminate_cells<const S: usize, const W: usize>(&mut self, system: &System) -> Result<(), Singular> {
         let (a, b) = (&self.rule.a, &self.rule.b);
         let cells = system.cells.len();
+        let size = W - GAIN;
+        let extensible = size > 3 * S;
         self.relations[cells] = system.tip;
         for cell in (0..cells).rev() {
             let ends = &system.cells[cell];
             let points: &[Point; S] = system.points[cell * S..][..S].try_into().unwrap_or_else(|_| unreachable!());
             let h = ends.length;
 
-            // rotations
-            let log: [Affine<B>; S] = from_fn(|k| {
-                let mut log = Affine::constant(-points[k].e_log);
+            // A φ + M Φ = A φ₀ + (A T + M) (h Σ weights_l g_l − e), by A and A T + M
+            let turned = |by_phi: &Mat3, by_log: &Mat3, weights: &[f64; MAX_STAGES], e: &Vec3| {
+                let mut f = Affine::<W>::constant(-(by_log * e));
                 for l in 0..S {
-                    log.u[l] = Mat3::from_diagonal_element(h * a[k][l]);
+                    f.add_block(3 * l, &(by_log * (h * weights[l])));
                 }
-                log
-            });
-            let rotation = |spin: &Mat3, weights: &[f64; MAX_STAGES], e: &Vec3| {
-                let mut phi = Affine::constant(-(spin * e));
-                for l in 0..S {
-                    phi.u[l] = spin * (h * weights[l]);
-                }
-                phi.phi = Mat3::identity();
-                phi
+                f.add_block(Affine::<W>::PHI_0, by_phi);
+                f
             };
-            let phi: [Affine<B>; S] = from_fn(|k| rotation(&points[k].spin, &a[k], &points[k].e_log));
-            let phi_1: Affine<B> = rotation(&ends.spin, b, &ends.e_log);
+            let at = |k: usize, by_phi: &Mat3| turned(by_phi, &(by_phi * points[k].spin), &a[k], &points[k].e_log);
+            let at_end = |by_phi: &Mat3| turned(by_phi, &(by_phi * ends.spin), b, &ends.e_log);
 
             // the accumulated vector
-            let driven: [Affine<B>; S] = from_fn(|k| phi[k].times(&points[k].w_phi));
-            let w_s: [Affine<B>; S] = if B == S {
-                driven
-            } else {
+            let driven: [Affine<W>; S] = from_fn(|k| at(k, &points[k].w_phi));
+            let w_s: [Affine<W>; S] = if extensible {
                 from_fn(|k| {
                     let mut w_s = Affine::constant(Vec3::zeros());
-                    w_s.u[S + k] = Mat3::identity();
+                    w_s.add_block(3 * (S + k), &Mat3::identity());
                     w_s
                 })
+            } else {
+                driven
             };
             let accumulate = |weights: &[f64; MAX_STAGES], e: &Vec3| {
                 let mut w = Affine::constant(-e);
-                w.w = Mat3::identity();
-                for l in 0..S {
-                    w.add(h * weights[l], &w_s[l]);
-                }
+                w.add_block(Affine::<W>::W_0, &Mat3::identity());
+                w.add_sum(from_fn(|l| h * weights[l]), &w_s);
                 w
             };
-            let w: [Affine<B>; S] = from_fn(|k| accumulate(&a[k], &points[k].e_w));
+            let w: [Affine<W>; S] = from_fn(|k| accumulate(&a[k], &points[k].e_w));
             let w_1 = accumulate(b, &ends.e_w);
 
             // force and moment, from node 1 backwards
             let tip = &self.relations[cell + 1];
             let related = |by_w: &Mat3, by_phi: &Mat3, constant: &Vec3| {
-                let mut f = w_1.times(by_w);
-                f.add(1.0, &phi_1.times(by_phi));
-                f.one += constant;
+                let mut f = at_end(by_phi);
+                f.add_product(by_w, &w_1);
+                f.add_constant(constant);
                 f
             };
             let n_1 = related(&tip.n_w, &tip.n_phi, &tip.n);
             let m_1 = related(&tip.m_w, &tip.m_phi, &tip.m);
-            let backward = |f_1: &Affine<B>, f_s: &[Affine<B>; S], scale: f64, from: &[f64; MAX_STAGES], e: &Vec3| {
+            let backward = |f_1: &Affine<W>, f_s: &[Affine<W>; S], scale: f64, from: &[f64; MAX_STAGES], e: &Vec3| {
                 let mut f = *f_1;
-                for l in 0..S {
-                    f.add(-h * scale * (b[l] - from[l]), &f_s[l]);
-                }
-                f.one -= e;
+                f.add_sum(from_fn(|l| -h * scale * (b[l] - from[l])), f_s);
+                f.add_constant(&-e);
                 f
             };
             let origin = [0.0; MAX_STAGES];
-            let n: [Affine<B>; S] = from_fn(|k| backward(&n_1, &w, system.mass, &a[k], &points[k].e_n));
+            let n: [Affine<W>; S] = from_fn(|k| backward(&n_1, &w, system.mass, &a[k], &points[k].e_n));
             let n_0 = backward(&n_1, &w, system.mass, &origin, &ends.e_n);
-            let m_s: [Affine<B>; S] = from_fn(|k| {
-                let mut m_s = phi[k].times(&points[k].m_phi);
-                m_s.add(1.0, &n[k].times(&points[k].m_n));
+            let m_s: [Affine<W>; S] = from_fn(|k| {
+                let mut m_s = at(k, &points[k].m_phi);
+                m_s.add_product(&points[k].m_n, &n[k]);
                 m_s
             });
             let m_0 = backward(&m_1, &m_s, 1.0, &origin, &ends.e_m);
 
             // the law at every point, and w' if it is an unknown of its own
-            let size = 3 * B;
-            let width = size + GAIN;
+            let (rows, _) = self.scratch.as_chunks_mut::<W>();
             for k in 0..S {
                 let point = &points[k];
-                let mut law = log[k].times(&point.law_log);
-                law.add(1.0, &phi[k].times(&point.law_phi));
-                law.add(-1.0, &backward(&m_1, &m_s, 1.0, &a[k], &point.e_m));
-                law.u[k] += point.law_strain;
-                law.one += point.e_law;
-                store(&mut self.scratch, width, k, &law);
-                if B > S {
+                let by_log = point.law_phi * point.spin + point.law_log;
+                let mut law = turned(&point.law_phi, &by_log, &a[k], &point.e_log);
+                law.subtract(&m_1);
+                law.add_sum(from_fn(|l| h * (b[l] - a[k][l])), &m_s);
+                law.add_block(3 * k, &point.law_strain);
+                law.add_constant(&(point.e_m + point.e_law));
+                rows[3 * k..][..3].copy_from_slice(&law.0);
+                if extensible {
                     let mut row = w_s[k];
-                    row.add(-1.0, &driven[k]);
-                    row.add(-1.0, &n[k].times(&point.w_n));
-                    store(&mut self.scratch, width, S + k, &row);
+                    row.subtract(&driven[k]);
+                    row.add_product(&-point.w_n, &n[k]);
+                    rows[3 * (S + k)..][..3].copy_from_slice(&row.0);
                 }
             }
-            let gain = &mut self.gains[cell * size * GAIN..][..size * GAIN];
-            solve_rows(&mut self.scratch, size, gain).ok_or(Singular { cell })?;
+            let gain = &mut self.gains[cell * size..][..size];
+            solve_rows(rows, gain).ok_or(Singular { cell })?;
 
             // close the cell
-            let closed = |f: &Affine<B>| {
-                let (mut by_w, mut by_phi, mut one) = (f.w, f.phi, f.one);
-                for (l, u) in f.u.iter().enumerate() {
-                    let rows = &gain[3 * l * GAIN..];
-                    by_w += u * Mat3::from_fn(|i, j| rows[i * GAIN + j]);
-                    by_phi += u * Mat3::from_fn(|i, j| rows[i * GAIN + 3 + j]);
-                    one += u * Vec3::from_fn(|i, _| rows[i * GAIN + 6]);
-                }
-                (by_w, by_phi, one)
+            let closed = |f: &Affine<W>| {
+                let rows = f.0.map(|row| {
+                    let (u, rest) = row.split_at(size);
+                    let mut closed: [f64; GAIN] = from_fn(|c| rest[c]);
+                    for (u, gain) in u.iter().zip(gain.iter()) {
+                        for c in 0..GAIN {
+                            closed[c] += u * gain[c];
+                        }
+                    }
+                    closed
+                });
+                let block = |first: usize| Mat3::from_fn(|i, j| rows[i][first + j]);
+                (block(0), block(3), Vec3::from_fn(|i, _| rows[i][6]))
             };
             let (n_w, n_phi, n) = closed(&n_0);
             let (m_w, m_phi, m) = closed(&m_0);
@@ -335,8 +411,8 @@ impl Sweep {
         Ok(())
     }
 
-    /// From the base to the tip: the increments.
-    fn substitute(&mut self, system: &System) {
+    /// From the base to the tip: the increments, for the correction `system.base` and the residuals that were eliminated.
+    pub fn substitute(&mut self, system: &System) {
         let (a, b) = (&self.rule.a, &self.rule.b);
         let stages = self.rule.stages;
         let size = 3 * self.blocks;
@@ -348,10 +424,10 @@ impl Sweep {
             let increments = &mut self.points[cell * stages..][..stages];
             let h = ends.length;
             let Increment { w: w_0, phi: phi_0, .. } = self.nodes[cell];
-            let gain = &self.gains[cell * size * GAIN..][..size * GAIN];
+            let gain = &self.gains[cell * size..][..size];
             let unknown = |block: usize| {
                 Vec3::from_fn(|i, _| {
-                    let row = &gain[(3 * block + i) * GAIN..][..GAIN];
+                    let row = &gain[3 * block + i];
                     (0..3).fold(row[6], |sum, j| sum + row[j] * w_0[j] + row[3 + j] * phi_0[j])
                 })
             };
@@ -393,64 +469,45 @@ impl Sweep {
     }
 }
 
-/// Writes three rows of the cell's equations: the coefficients of u, then those of (w₀, φ₀, 1).
-#[inline(always)]
-fn store<const B: usize>(rows: &mut [f64], width: usize, block: usize, f: &Affine<B>) {
-    for i in 0..3 {
-        let row = &mut rows[(3 * block + i) * width..][..width];
-        for (l, u) in f.u.iter().enumerate() {
-            for j in 0..3 {
-                row[3 * l + j] = u[(i, j)];
-            }
-        }
-        for j in 0..3 {
-            row[3 * B + j] = f.w[(i, j)];
-            row[3 * B + 3 + j] = f.phi[(i, j)];
-        }
-        row[3 * B + 6] = f.one[i];
-    }
-}
-
 /// Solves rows · (u, x, 1) = 0 for u = gain (x, 1): Gaussian elimination with scaled partial pivoting.
 /// `None` where a pivot vanishes or is not finite.
-fn solve_rows(rows: &mut [f64], size: usize, gain: &mut [f64]) -> Option<()> {
-    let width = size + GAIN;
-    for row in rows.chunks_exact_mut(width).take(size) {
+fn solve_rows<const W: usize>(rows: &mut [[f64; W]], gain: &mut [[f64; GAIN]]) -> Option<()> {
+    let size = gain.len();
+    for row in rows.iter_mut() {
         let largest = row[..size].iter().fold(0.0f64, |max, x| max.max(x.abs()));
         if !(largest > 0.0 && largest.is_finite()) {
             return None;
         }
         let scale = 1.0 / largest;
-        for x in row {
-            *x *= scale;
-        }
+        row.iter_mut().for_each(|x| *x *= scale);
     }
     for pivot in 0..size {
-        let magnitude = |row: usize| rows[row * width + pivot].abs();
+        let magnitude = |row: usize| rows[row][pivot].abs();
         let best = (pivot + 1..size).fold(pivot, |best, row| if magnitude(row) > magnitude(best) { row } else { best });
         if !(magnitude(best) > 0.0 && magnitude(best).is_finite()) {
             return None;
         }
-        if best != pivot {
-            let (upper, lower) = rows.split_at_mut(best * width);
-            upper[pivot * width..][..width].swap_with_slice(&mut lower[..width]);
-        }
-        let (upper, lower) = rows.split_at_mut((pivot + 1) * width);
-        let pivot_row = &upper[pivot * width..];
+        rows.swap(pivot, best);
+        let (upper, lower) = rows.split_at_mut(pivot + 1);
+        let pivot_row = &upper[pivot];
         let inverse = 1.0 / pivot_row[pivot];
-        for row in lower.chunks_exact_mut(width).take(size - pivot - 1) {
+        for row in lower {
             let factor = row[pivot] * inverse;
-            for (x, p) in row[pivot + 1..].iter_mut().zip(&pivot_row[pivot + 1..width]) {
-                *x -= factor * p;
+            for c in pivot + 1..W {
+                row[c] -= factor * pivot_row[c];
             }
         }
     }
     for i in (0..size).rev() {
-        for column in 0..GAIN {
-            let row = &rows[i * width..][..width];
-            let known = (i + 1..size).fold(row[size + column], |sum, j| sum + row[j] * gain[j * GAIN + column]);
-            gain[i * GAIN + column] = -known / row[i];
+        let row = &rows[i];
+        let (upper, lower) = gain.split_at_mut(i + 1);
+        let mut known: [f64; GAIN] = from_fn(|c| row[size + c]);
+        for (x, solved) in row[i + 1..].iter().zip(lower) {
+            for c in 0..GAIN {
+                known[c] += x * solved[c];
+            }
         }
+        upper[i] = known.map(|known| -known / row[i]);
     }
     Some(())
 }

@@ -1,0 +1,188 @@
+//! Work and time of one Newton iteration, per cell: `cargo bench --bench step`.
+//!
+//! Instructions are counted by callgrind, if it is installed: the program runs itself under it and takes the difference of two
+//! runs, so that what is counted is one iteration and nothing else. Times are medians. The rod is of rubber, twisted and bent,
+//! on a turning base.
+#![allow(missing_docs)]
+
+// the tests use the rest of it
+#[allow(dead_code)]
+#[path = "../tests/common/banded.rs"]
+mod banded;
+#[path = "../tests/common/full.rs"]
+mod full;
+
+use banded::{Banded, flat};
+use cosserat_rod::alpha::Scheme;
+use cosserat_rod::mesh::Mesh;
+use cosserat_rod::pose::{Base, Boundary, Row, State, Time, assemble};
+use cosserat_rod::rod::Rod;
+use cosserat_rod::so3;
+use cosserat_rod::sweep::{Sweep, System};
+use full::Full;
+use nalgebra::{Matrix3, Vector3};
+use std::hint::black_box;
+use std::process::Command;
+use std::time::Instant;
+
+const CELLS: [usize; 7] = [10, 30, 100, 300, 1000, 3000, 10_000];
+const STAGES: [usize; 2] = [1, 4];
+const DT: f64 = 5e-3;
+
+/// The parts of an iteration.
+const PHASES: [&str; 4] = ["assembly", "elimination", "substitution", "update"];
+
+/// A rod in the middle of a step, ready for any phase any number of times.
+struct Iteration {
+    mesh: Mesh,
+    rod: Rod,
+    boundary: Boundary,
+    time: Time,
+    old: State,
+    trial: State,
+    system: System,
+    sweep: Sweep,
+}
+
+impl Iteration {
+    fn new(cells: usize, stages: usize) -> Self {
+        let shape = Mesh::uniform(1.0, cells, stages, Vector3::new(1.0, 0.5, 0.2));
+        let base = Base {
+            angular_velocity: Vector3::new(1.0, 2.0, 3.0),
+            ..Base::at_rest(Vector3::zeros(), Matrix3::identity())
+        };
+        let turned = Base { rotation: so3::exp(&(base.angular_velocity * DT)), ..base };
+        let mesh = Mesh::uniform(1.0, cells, stages, Vector3::zeros());
+        let system = System::new(cells, &mesh.rule, false);
+        Self {
+            sweep: Sweep::new(cells, &mesh.rule, false),
+            rod: Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0),
+            boundary: Boundary {
+                base: turned,
+                tip_force: Vector3::zeros(),
+                tip_moment: Vector3::zeros(),
+                gravity: Vector3::new(0.0, 0.0, -9.81),
+            },
+            time: Time::Step { scheme: Scheme::from_spectral_radius(0.5), dt: DT, row: Row::Rotations },
+            old: State::at_rest_shape(&shape, &base),
+            trial: State::at_rest_shape(&shape, &turned),
+            mesh,
+            system,
+        }
+    }
+
+    fn run(&mut self, phase: &str) {
+        let Self { mesh, rod, boundary, time, old, trial, system, sweep } = self;
+        match phase {
+            "assembly" => {
+                assemble(mesh, rod, old, trial, boundary, time, system);
+            }
+            "elimination" => sweep.eliminate(system).expect("the rod's cells are regular"),
+            "substitution" => sweep.substitute(system),
+            // a vanishing part of the increment: the same work, and the state stays
+            _ => trial.apply(&sweep.nodes, &sweep.points, 1e-12, Row::Rotations),
+        }
+        black_box(&mut *self);
+    }
+
+    /// Seconds of one run, the median of many.
+    fn seconds(&mut self, phase: &str, cells: usize) -> f64 {
+        let repetitions = (1000 / cells).max(1);
+        let sample = |_| {
+            let start = Instant::now();
+            for _ in 0..repetitions {
+                self.run(phase);
+            }
+            start.elapsed().as_secs_f64() / repetitions as f64
+        };
+        median((0..15).map(sample).collect())
+    }
+}
+
+fn median(mut samples: Vec<f64>) -> f64 {
+    samples.sort_by(f64::total_cmp);
+    samples[samples.len() / 2]
+}
+
+/// Instructions of this program under callgrind with so many iterations.
+fn counted(cells: usize, stages: usize, iterations: usize) -> Option<f64> {
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(std::env::current_exe().ok()?)
+        .arg("--count")
+        .args([cells, stages, iterations].map(|number| number.to_string()))
+        .output()
+        .ok()?;
+    // "==1== Collected : 123"
+    let report = String::from_utf8(output.stderr).ok()?;
+    let line = report.lines().find(|line| line.contains("Collected"))?;
+    line.rsplit(' ').next()?.parse().ok()
+}
+
+/// Instructions of one iteration.
+fn instructions(cells: usize, stages: usize) -> Option<f64> {
+    Some(counted(cells, stages, 2)? - counted(cells, stages, 1)?)
+}
+
+/// Seconds of the sweep and of the banded LU, factors and solution, on the same system.
+fn sweep_and_lu(iteration: &mut Iteration, cells: usize) -> (f64, f64) {
+    let sweep = iteration.seconds("elimination", cells) + iteration.seconds("substitution", cells);
+    let full = Full::new(&iteration.system, &iteration.mesh.rule);
+    let right = flat(&full.right);
+    let sample = |_| {
+        let matrix = Banded::new(&full);
+        let start = Instant::now();
+        black_box(matrix.factored().expect("a regular matrix").solve(&right));
+        start.elapsed().as_secs_f64()
+    };
+    (sweep, median((0..5).map(sample).collect()))
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    if let Some(at) = arguments.iter().position(|argument| argument == "--count") {
+        let number = |i: usize| arguments[at + i].parse().expect("a number");
+        let mut iteration = Iteration::new(number(1), number(2));
+        for _ in 0..number(3) {
+            PHASES.iter().for_each(|phase| iteration.run(phase));
+        }
+        return;
+    }
+
+    for stages in STAGES {
+        println!(
+            "\nOne Newton iteration with {stages} Gauss point(s) in a cell: instructions per cell, those of a further cell"
+        );
+        println!(
+            "(the difference to the line above: without what the ends of the rod cost), time per cell and its shares"
+        );
+        let phases = PHASES.map(|phase| format!("{phase:>14}")).concat();
+        println!("{:>6} {:>14} {:>14} {:>9}{phases}", "cells", "instructions", "further cell", "ns");
+        let mut before: Option<(usize, f64)> = None;
+        for cells in CELLS {
+            let mut iteration = Iteration::new(cells, stages);
+            PHASES.iter().for_each(|phase| iteration.run(phase));
+            let times = PHASES.map(|phase| iteration.seconds(phase, cells) / cells as f64);
+            let total: f64 = times.iter().sum();
+            let shares = times.map(|time| format!("{:>12.0} %", 100.0 * time / total)).concat();
+
+            let work = instructions(cells, stages);
+            let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1}"));
+            let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
+            before = work.map(|work| (cells, work));
+            let per_cell = show(work.map(|work| work / cells as f64));
+            println!("{cells:>6} {per_cell:>14} {:>14} {:>9.0}{shares}", show(further), total * 1e9);
+        }
+    }
+
+    println!("\nSweep and banded LU with partial pivoting on the same systems, µs");
+    println!("{:>6} {:>7} {:>10} {:>10} {:>7}", "stages", "cells", "sweep", "LU", "ratio");
+    for stages in STAGES {
+        for cells in [10, 100, 400] {
+            let mut iteration = Iteration::new(cells, stages);
+            PHASES.iter().for_each(|phase| iteration.run(phase));
+            let (sweep, lu) = sweep_and_lu(&mut iteration, cells);
+            println!("{stages:>6} {cells:>7} {:>10.1} {:>10.1} {:>7.1}", sweep * 1e6, lu * 1e6, lu / sweep);
+        }
+    }
+}

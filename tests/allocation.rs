@@ -1,0 +1,86 @@
+//! A step allocates nothing, whatever the rod, the row and the way it ends.
+#![allow(missing_docs)]
+// a global allocator cannot be had otherwise
+#![allow(unsafe_code)]
+
+use cosserat_rod::alpha::Scheme;
+use cosserat_rod::mesh::Mesh;
+use cosserat_rod::pose::{Base, Boundary, Row, State};
+use cosserat_rod::rod::Rod;
+use cosserat_rod::stepper::Stepper;
+use nalgebra::{Matrix3, Vector3};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    /// Allocations of this thread: the harness allocates when it likes in its own.
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every call is passed on to the system's allocator with the caller's own arguments.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: as above
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as above
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    // `realloc` and `alloc_zeroed` come here through `alloc`, by their default bodies
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.get();
+    work();
+    ALLOCATIONS.get() - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(vec![0u8; 100]))), 1);
+}
+
+#[test]
+fn a_step_allocates_nothing() {
+    let loaded = Rod { drag: 0.1, tip_mass: 0.01, tip_inertia: 1e-6, ..Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0) };
+    let damped = Rod { damping: Vector3::new(0.01, 0.01, 0.01), ..loaded.clone() };
+    let extensible = Rod { compliance: Vector3::new(1e-2, 1e-2, 3e-3), ..damped.clone() };
+    let boundary = Boundary {
+        base: Base::at_rest(Vector3::zeros(), Matrix3::identity()),
+        tip_force: Vector3::new(0.1, 0.0, 0.0),
+        tip_moment: Vector3::new(0.0, 0.0, 1e-3),
+        gravity: Vector3::new(9.81, 0.0, 0.0),
+    };
+    for stages in 1..=4 {
+        for (rod, row) in [
+            (&loaded, Row::Rotations),
+            (&damped, Row::Rotations),
+            (&damped, Row::Positions),
+            (&extensible, Row::Positions),
+        ] {
+            let mesh = Mesh::uniform(1.0, 8, stages, Vector3::zeros());
+            let state = State::at_rest_shape(&mesh, &boundary.base);
+            let mut stepper = Stepper::new(mesh, rod.clone(), state);
+            let count = allocations(|| {
+                for _ in 0..5 {
+                    stepper.step(&boundary, Scheme::from_spectral_radius(0.5), 5e-3, row).unwrap();
+                }
+                // a step that fails, and with it both ways of iterating
+                let absurd = Boundary { tip_force: Vector3::new(1e300, 0.0, 0.0), ..boundary };
+                stepper.step(&absurd, Scheme::BACKWARD_EULER, 5e-3, row).unwrap_err();
+                stepper.relax(&boundary).ok();
+                stepper.start(&boundary).ok();
+            });
+            assert_eq!(count, 0, "{stages} stages, {row:?}, {rod:?}");
+        }
+    }
+}
