@@ -221,7 +221,7 @@ fn modes_are_those_of_a_cantilever() {
 }
 
 #[test]
-fn modes_tell_twist_from_bending() {
+fn modes_tell_twist_and_stretch_from_bending() {
     // c/(4 L) with c = √(GJ/ρIp); short, so that twist is among the lowest
     let (length, modulus, density): (f64, f64, f64) = (0.05, 5e6 / 3.0, 1100.0);
     let expected = (modulus / density).sqrt() / (4.0 * length);
@@ -230,6 +230,15 @@ fn modes_tell_twist_from_bending() {
     let twist: Vec<&str> = text.lines().filter(|line| line.contains("twist")).collect();
     assert_eq!(twist.len(), 1, "{text}");
     let frequency: f64 = twist[0].split_whitespace().nth(1).unwrap().parse().unwrap();
+    assert!((frequency / expected - 1.0).abs() < 1e-4, "{frequency} {expected}");
+
+    let set = ["--set", "length=0.05", "--set", "gravity=0,0,0", "--set", "extensible=true"];
+    let text = cosserat(&directory("stretch"), &[&["modes", "--count", "7"][..], &set].concat());
+    let stretch: Vec<&str> = text.lines().filter(|line| line.contains("stretch")).collect();
+    assert_eq!(stretch.len(), 1, "{text}");
+    let frequency: f64 = stretch[0].split_whitespace().nth(1).unwrap().parse().unwrap();
+    // the same with √(E/ρ)
+    let expected = (5e6 / density).sqrt() / (4.0 * length);
     assert!((frequency / expected - 1.0).abs() < 1e-4, "{frequency} {expected}");
 }
 

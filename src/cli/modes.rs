@@ -20,6 +20,9 @@ pub struct Arguments {
 /// Below this part of the kinetic energy in the motion of the centreline, a mode is one of twist.
 const TWIST: f64 = 0.5;
 
+/// Above this part of the strain of the centreline along itself, a mode is one of stretch.
+const STRETCH: f64 = 0.5;
+
 /// Prints the table.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let (mut parameters, inputs) = super::settings(&arguments.set)?;
@@ -35,6 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     writeln!(out, "about the static equilibrium, damping left out; tip at {}", point(&unit.outputs().tip_position))?;
     writeln!(out, "  no   frequency        period   kind        motion along x, y, z")?;
     writeln!(out, "              Hz             s               of the world, per cent")?;
+    let nodes: Vec<Vector3<f64>> = unit.stepper().state.nodes.iter().map(|node| node.position).collect();
     for (k, mode) in unit.modes(count)?.iter().enumerate() {
         let frequency = mode.frequency();
         write!(out, "{:4} {:>11} {:>13}", k + 1, digits(frequency), digits(1.0 / frequency))?;
@@ -42,7 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
             writeln!(out, "   twist")?;
         } else {
             let [x, y, z] = shares(mode);
-            writeln!(out, "   bending    {x:5.0} {y:5.0} {z:5.0}")?;
+            let kind = if stretch(mode, &nodes) < STRETCH { "bending" } else { "stretch" };
+            writeln!(out, "   {kind}    {x:5.0} {y:5.0} {z:5.0}")?;
         }
     }
     Ok(())
@@ -62,4 +67,15 @@ fn digits(value: f64) -> String {
 fn shares(mode: &Mode) -> [f64; 3] {
     let sum: Vector3<f64> = mode.shape.iter().map(|at| at.component_mul(at)).sum();
     (sum * (100.0 / sum.sum())).into()
+}
+
+/// How much of the difference of motion between neighbouring nodes is along the rod.
+fn stretch(mode: &Mode, nodes: &[Vector3<f64>]) -> f64 {
+    let (mut along, mut all) = (0.0, 0.0);
+    for (ends, motion) in nodes.windows(2).zip(mode.shape.windows(2)) {
+        let change = motion[1] - motion[0];
+        along += (ends[1] - ends[0]).normalize().dot(&change).powi(2);
+        all += change.norm_squared();
+    }
+    along / all
 }
