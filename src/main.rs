@@ -1,8 +1,11 @@
 //! The command line: parse, call, print errors once.
 
+mod cli;
+
 use clap::{Parser, Subcommand};
 use cosserat_rod::package;
 use std::error::Error;
+use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -22,11 +25,19 @@ enum Command {
         #[arg(short, long, default_value = "target/CosseratRod.fmu")]
         output: PathBuf,
     },
+    /// Packages the unit, shakes it through its C interface, and draws what it did.
+    Demo(cli::demo::Arguments),
+    /// Runs the rod: a CSV of inputs in, a CSV of outputs out.
+    Simulate(cli::simulate::Arguments),
+    /// Prints the natural frequencies of the rod about its static equilibrium.
+    Modes(cli::modes::Arguments),
 }
 
 fn main() -> ExitCode {
     match run(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
+        // who reads only the first lines has what they want
+        Err(error) if is_broken_pipe(&*error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("cosserat: {error}");
             ExitCode::FAILURE
@@ -41,5 +52,16 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
             println!("{}", output.display());
             Ok(())
         }
+        Command::Demo(arguments) => cli::demo::run(&arguments),
+        Command::Simulate(arguments) => cli::simulate::run(&arguments),
+        Command::Modes(arguments) => cli::modes::run(&arguments),
     }
+}
+
+fn is_broken_pipe(error: &(dyn Error + 'static)) -> bool {
+    let kind = match (error.downcast_ref::<io::Error>(), error.downcast_ref::<csv::Error>().map(csv::Error::kind)) {
+        (Some(error), _) | (_, Some(csv::ErrorKind::Io(error))) => error.kind(),
+        _ => return false,
+    };
+    kind == io::ErrorKind::BrokenPipe
 }

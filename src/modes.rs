@@ -23,6 +23,9 @@ pub struct Mode {
     pub omega_squared: f64,
     /// Displacement of the nodes, world frame, base first; the largest component is 1.
     pub shape: Vec<Vector3<f64>>,
+    /// Part of the kinetic energy that is in the motion of the centreline; the rest turns the sections. Near 0 for torsion, whose
+    /// `shape` says nothing.
+    pub travel: f64,
 }
 
 impl Mode {
@@ -97,7 +100,15 @@ pub fn modes(stepper: &mut Stepper, boundary: &Boundary, count: usize) -> Result
             if largest > 0.0 {
                 shape.iter_mut().for_each(|x| *x /= largest);
             }
-            Mode { omega_squared: 1.0 / eigen.eigenvalues[i], shape }
+            let mut travel: Field = vec![(Vector3::zeros(), Vector3::zeros()); points + 1];
+            for (j, other) in basis.iter().enumerate() {
+                for ((sum, _), (x, _)) in travel.iter_mut().zip(other) {
+                    *sum += x * eigen.eigenvectors[(j, i)];
+                }
+            }
+            // the whole is 1: the basis is orthonormal in the kinetic energy
+            let travel = product(stepper, &travel, &travel);
+            Mode { omega_squared: 1.0 / eigen.eigenvalues[i], shape, travel }
         })
         .collect();
     modes.sort_by(|a, b| a.omega_squared.total_cmp(&b.omega_squared));

@@ -32,6 +32,8 @@ const RESOLVED_START: f64 = 0.01;
 const SMOOTH: f64 = 0.25;
 /// Turn of a section in a step, rad, that no change of its acceleration need be smaller than.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Part of a step by which the next may differ and still be the same: hosts take the differences of rounded times.
+const ROUND_OFF: f64 = 1e-9;
 /// Part of the static loads below which the equilibrium is given up.
 const SMALLEST_LOAD_PART: f64 = 1e-4;
 
@@ -154,11 +156,12 @@ impl Stepper {
         let change = dt * most(|spin| spin.jerk.norm());
         let changes_less = |part: f64| change <= part * acceleration + NEGLIGIBLE / (dt * dt);
         // implicit Euler and spectral radius 0 have the same auxiliary rates
-        let on_floor = started && self.state.dt == dt && self.state.scheme.gamma == floor.gamma;
+        let same_step = (self.state.dt - dt).abs() <= ROUND_OFF * dt;
+        let on_floor = started && same_step && self.state.scheme.gamma == floor.gamma;
         let resolved = match (started, on_floor && self.state.row == Row::Positions) {
             (false, _) => turn < RESOLVED && bend < RESOLVED_START && changes_less(1.0),
             (true, true) => turn + bend < RESOLVED_AGAIN && changes_less(1.0),
-            (true, false) if self.state.dt != dt => turn + bend < RESOLVED,
+            (true, false) if !same_step => turn + bend < RESOLVED,
             (true, false) => turn < RESOLVED,
         };
         let mut lost = 0;

@@ -211,3 +211,22 @@ fn an_equilibrium_stays_and_an_unstable_one_is_refused() {
     let error = Unit::new(&resting, &standing, None).unwrap_err();
     assert!(matches!(error, Error::UnstableEquilibrium { .. }), "{error}");
 }
+
+#[test]
+fn a_step_that_differs_by_the_rounding_of_a_host_is_the_same_step() {
+    // steps that do not resolve the motion: there the way of a step depends on the one before
+    let parameters = Parameters { step: 1.0, cells: 5, stages: 2, ..Parameters::default() };
+    let tips = |rounding: [f64; 3]| -> Vec<Vec3> {
+        let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+        let step = |i: usize| {
+            unit.advance(&Inputs::default(), 1.0 / 32.0 * (1.0 + rounding[i % 3])).unwrap();
+            unit.outputs().tip_position
+        };
+        (0..64).map(step).collect()
+    };
+    let exact = tips([0.0; 3]);
+    let rounded = tips([4e-16, -4e-16, 0.0]);
+    for (i, (a, b)) in exact.iter().zip(&rounded).enumerate() {
+        assert!((a - b).norm() < 1e-9, "step {i}: {a} and {b}");
+    }
+}

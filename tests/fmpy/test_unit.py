@@ -1,10 +1,12 @@
 """The packaged unit as users of fmpy meet it.
 
-Needs what the build leaves in `target`: `CosseratRod.fmu` and the table of `examples/trajectory.rs`.
+Needs what `tests/run` leaves in `target`: `CosseratRod.fmu`, the inputs `drive.csv`, and `trajectory.csv`, which
+`cosserat simulate` makes of them.
 """
 
 import csv
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -80,32 +82,33 @@ def test_simulate_without_options_runs_the_default_experiment(tmp_path):
     assert all(math.isfinite(float(value)) for row in rows for value in row.values())
 
 
-def test_the_numbers_are_those_of_the_library_bit_for_bit(instance, description, reference):
-    variables = {variable.name: variable for variable in description.modelVariables}
-    with open(TARGET / "trajectory.csv") as file:
-        rows = list(csv.DictReader(file))
-    names = [name for name in rows[0] if name != "time"]
-    inputs = [name for name in names if variables[name].causality == "input"]
-    reals = [name for name in names if variables[name].causality == "output" and variables[name].type == "Real"]
-    counts = [name for name in names if variables[name].type == "Integer"]
-    assert len(inputs) + len(reals) + len(counts) == len(names) and len(rows) == STEPS + 1
-
-    initialize(instance)
-    time = 0.0
-    for row in rows:
-        if row is not rows[0]:
-            instance.setReal([reference[name] for name in inputs], [float(row[name]) for name in inputs])
-            instance.doStep(currentCommunicationPoint=time, communicationStepSize=STEP)
-            time += STEP
-        assert time == float(row["time"])
-        outputs = instance.getReal([reference[name] for name in reals])
-        expected = np.array([float(row[name]) for name in reals])
-        assert np.array(outputs).tobytes() == expected.tobytes(), time
-        assert instance.getInteger([reference[name] for name in counts]) == [int(row[name]) for name in counts]
-    instance.terminate()
+def table(path):
+    with open(path) as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array([[float(text) for text in row] for row in rows[1:]])
 
 
-@pytest.mark.xfail(strict=True, reason="the rod itself is still missing")
+def test_the_numbers_are_those_of_the_library_bit_for_bit(description):
+    names, expected = table(TARGET / "trajectory.csv")
+    inputs, drive = table(TARGET / "drive.csv")
+    outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
+    assert sorted(names) == sorted(["time", *outputs]) and len(expected) == STEPS + 1
+    signals = np.rec.fromarrays(drive.T, names=inputs)
+    result = simulate_fmu(FMU, input=signals, output=outputs)
+    for column, name in enumerate(names):
+        assert result[name].astype(float).tobytes() == expected[:, column].tobytes(), name
+
+
+def test_the_snippet_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    """As it stands there, from the root of the repository."""
+    text = (TARGET.parent / "README.md").read_text()
+    [snippet] = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert len(snippet.splitlines()) <= 10
+    monkeypatch.chdir(TARGET.parent)
+    exec(compile(snippet, "README.md", "exec"), {})
+    assert len(capsys.readouterr().out.splitlines()) >= 1
+
+
 @pytest.mark.parametrize("motion", [0, 1, 2])
 def test_the_base_follows_the_inputs_its_motion_names(instance, reference, motion):
     """A base that moves along y at constant speed; what the motion does not name stays as it was."""
