@@ -164,6 +164,69 @@ pub struct Outputs {
     pub cells: i32,
 }
 
+/// What a variable may be set to, beyond being finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Allowed {
+    /// Every finite value.
+    Finite,
+    /// Above zero.
+    Positive,
+    /// Zero and above.
+    NonNegative,
+    /// Both ends included.
+    Between(f64, f64),
+    /// A whole number, both ends included.
+    Choice(i32, i32),
+    /// What the words say.
+    Such(&'static str),
+}
+
+impl Allowed {
+    /// Whether `value` may be set. NaN and infinities never may.
+    pub fn contains(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Finite | Self::Such(_) => true,
+                Self::Positive => value > 0.0,
+                Self::NonNegative => value >= 0.0,
+                Self::Between(low, high) => (low..=high).contains(&value),
+                Self::Choice(low, high) => (f64::from(low)..=f64::from(high)).contains(&value),
+            }
+    }
+
+    /// The attribute `min`; that of a positive variable is the bound it must not reach, as FMI knows only closed ranges.
+    pub fn min(self) -> Option<f64> {
+        match self {
+            Self::Finite | Self::Such(_) => None,
+            Self::Positive | Self::NonNegative => Some(0.0),
+            Self::Between(low, _) => Some(low),
+            Self::Choice(low, _) => Some(low.into()),
+        }
+    }
+
+    /// The attribute `max`.
+    pub fn max(self) -> Option<f64> {
+        match self {
+            Self::Finite | Self::Such(_) | Self::Positive | Self::NonNegative => None,
+            Self::Between(_, high) => Some(high),
+            Self::Choice(_, high) => Some(high.into()),
+        }
+    }
+}
+
+impl fmt::Display for Allowed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Finite => write!(f, "finite"),
+            Self::Positive => write!(f, "finite and > 0"),
+            Self::NonNegative => write!(f, "finite and >= 0"),
+            Self::Between(low, high) => write!(f, "from {low} to {high}"),
+            Self::Such(words) => write!(f, "{words}"),
+            Self::Choice(low, high) => write!(f, "a whole number from {low} to {high}"),
+        }
+    }
+}
+
 /// Why the unit refused; names are those of the unit's variables.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
@@ -174,7 +237,7 @@ pub enum Error {
         /// Its value.
         value: f64,
         /// What is allowed.
-        allowed: &'static str,
+        allowed: Allowed,
     },
     /// The rod has no static equilibrium that can be reached from its rest shape.
     NoEquilibrium(Diverged),
@@ -250,6 +313,9 @@ impl fmt::Display for Warning {
 /// communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
+/// Most internal steps chosen for a communication step: what is faster than that is damped, not followed.
+const MAX_AUTOMATIC_STEPS: f64 = 1000.0;
+
 /// Internal steps in a communication step beyond which the host has asked for something else than it wants.
 const MAX_INTERNAL_STEPS: f64 = 1e7;
 
@@ -261,8 +327,9 @@ const MAX_HALVINGS: u32 = 12;
 pub struct Unit {
     stepper: Stepper,
     scheme: Scheme,
-    /// Longest internal step, s.
+    /// Longest internal step, s; and in its stead, where it was chosen here, the most steps in a communication step.
     step: f64,
+    most_steps: Option<f64>,
     gravity: Vector3<f64>,
     path: Path,
     energy: Energy,
@@ -310,51 +377,57 @@ impl Parameters {
         }
     }
 
+    /// Every number among the parameters: its name, its value and what it may be.
+    fn numbers(&self) -> [(&'static str, f64, Allowed); 27] {
+        use Allowed::{Between, Choice, Finite, NonNegative, Positive};
+        let [i_1, i_2] = self.section_second_moment;
+        let (kappa, g) = (self.rest_curvature, self.gravity);
+        [
+            ("length", self.length, Positive),
+            ("radius", self.radius, Positive),
+            ("density", self.density, Positive),
+            ("youngs_modulus", self.youngs_modulus, Positive),
+            ("shear_modulus", self.shear_modulus, Positive),
+            ("section.area", self.section_area, NonNegative),
+            ("section.second_moment[1]", i_1, NonNegative),
+            ("section.second_moment[2]", i_2, NonNegative),
+            ("section.torsion_constant", self.section_torsion_constant, NonNegative),
+            ("section.shear_correction", self.section_shear_correction, Positive),
+            ("rest_curvature[1]", kappa.x, Finite),
+            ("rest_curvature[2]", kappa.y, Finite),
+            ("rest_curvature[3]", kappa.z, Finite),
+            ("gravity[1]", g.x, Finite),
+            ("gravity[2]", g.y, Finite),
+            ("gravity[3]", g.z, Finite),
+            ("damping.bending", self.damping_bending, NonNegative),
+            ("damping.twist", self.damping_twist, NonNegative),
+            ("damping.drag", self.damping_drag, NonNegative),
+            ("tip.mass", self.tip_mass, NonNegative),
+            ("tip.inertia", self.tip_inertia, NonNegative),
+            ("base.motion", f64::from(self.base_motion), Choice(0, 2)),
+            ("cells", f64::from(self.cells), Choice(0, MAX_CELLS)),
+            ("stages", f64::from(self.stages), Choice(0, MAX_STAGES as i32)),
+            ("step", self.step, NonNegative),
+            ("tolerance", self.tolerance, NonNegative),
+            ("spectral_radius", self.spectral_radius, Between(0.0, 1.0)),
+        ]
+    }
+
+    /// What the parameter `name` may be.
+    pub fn allowed(name: &str) -> Allowed {
+        let numbers = Self::default().numbers();
+        numbers.iter().find(|(known, ..)| *known == name).map_or(Allowed::Finite, |(_, _, allowed)| *allowed)
+    }
+
     /// Refuses what no rod can have.
     ///
     /// # Errors
     /// [`Error::NotAllowed`] names the first parameter.
     pub fn validate(&self) -> Result<(), Error> {
-        const POSITIVE: (f64, f64, &str) = (f64::MIN_POSITIVE, f64::MAX, "finite and > 0");
-        const NOT_NEGATIVE: (f64, f64, &str) = (0.0, f64::MAX, "finite and >= 0");
-        const FINITE: (f64, f64, &str) = (f64::MIN, f64::MAX, "finite");
-        let [i_1, i_2] = self.section_second_moment;
-        let (kappa, g) = (self.rest_curvature, self.gravity);
-        let checks = [
-            ("length", self.length, POSITIVE),
-            ("radius", self.radius, POSITIVE),
-            ("density", self.density, POSITIVE),
-            ("youngs_modulus", self.youngs_modulus, POSITIVE),
-            ("shear_modulus", self.shear_modulus, POSITIVE),
-            ("section.area", self.section_area, NOT_NEGATIVE),
-            ("section.second_moment[1]", i_1, NOT_NEGATIVE),
-            ("section.second_moment[2]", i_2, NOT_NEGATIVE),
-            ("section.torsion_constant", self.section_torsion_constant, NOT_NEGATIVE),
-            ("section.shear_correction", self.section_shear_correction, POSITIVE),
-            ("rest_curvature[1]", kappa.x, FINITE),
-            ("rest_curvature[2]", kappa.y, FINITE),
-            ("rest_curvature[3]", kappa.z, FINITE),
-            ("gravity[1]", g.x, FINITE),
-            ("gravity[2]", g.y, FINITE),
-            ("gravity[3]", g.z, FINITE),
-            ("damping.bending", self.damping_bending, NOT_NEGATIVE),
-            ("damping.twist", self.damping_twist, NOT_NEGATIVE),
-            ("damping.drag", self.damping_drag, NOT_NEGATIVE),
-            ("tip.mass", self.tip_mass, NOT_NEGATIVE),
-            ("tip.inertia", self.tip_inertia, NOT_NEGATIVE),
-            ("base.motion", f64::from(self.base_motion), (0.0, 2.0, "0 pose and twist, 1 pose, 2 twist")),
-            ("cells", f64::from(self.cells), (0.0, MAX_CELLS, "0 (automatic) to 100000")),
-            ("stages", f64::from(self.stages), (0.0, MAX_STAGES as f64, "0 (automatic) to 4")),
-            ("step", self.step, NOT_NEGATIVE),
-            ("tolerance", self.tolerance, NOT_NEGATIVE),
-            ("spectral_radius", self.spectral_radius, (0.0, 1.0, "0 to 1")),
-        ];
-        for (name, value, (least, most, allowed)) in checks {
-            if !(least..=most).contains(&value) {
-                return Err(Error::NotAllowed { name, value, allowed });
-            }
+        match self.numbers().into_iter().find(|(_, value, allowed)| !allowed.contains(*value)) {
+            Some((name, value, allowed)) => Err(Error::NotAllowed { name, value, allowed }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// The cells: as given, or as many of four Gauss points as the bending length under the weight, the rest curvature and the
@@ -379,7 +452,7 @@ impl Parameters {
         };
         if turn >= MAX_CELL_TURN * cells as f64 {
             let name = "cells";
-            let allowed = "as many that the rest curvature turns less than 3 rad in each";
+            let allowed = Allowed::Such("as many that the rest curvature turns less than 3 rad in each");
             return Err(Error::NotAllowed { name, value: cells as f64, allowed });
         }
         Ok(Mesh::uniform(self.length, cells, stages, self.rest_curvature))
@@ -398,8 +471,8 @@ impl Parameters {
     }
 }
 
-/// Most cells a host may ask for.
-const MAX_CELLS: f64 = 100_000.0;
+/// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
+const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
 const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the motion.
@@ -428,7 +501,7 @@ impl Inputs {
         let components = vectors.iter().flat_map(|(names, vector)| names.iter().zip(vector.iter()));
         for (name, value) in components.chain(ORIENTATION.iter().zip(self.base_orientation.iter())) {
             if !value.is_finite() {
-                return Err(Error::NotAllowed { name, value: *value, allowed: "finite" });
+                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
             }
         }
         let norm = self.base_orientation.norm();
@@ -436,7 +509,7 @@ impl Inputs {
             return Err(Error::NotAllowed {
                 name: "base.orientation",
                 value: norm,
-                allowed: "a quaternion of norm > 0",
+                allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
             });
         }
         Ok(())
@@ -495,6 +568,7 @@ impl Unit {
         let mut unit = Self {
             scheme: Scheme::from_spectral_radius(parameters.spectral_radius),
             step,
+            most_steps: (parameters.step == 0.0).then_some(MAX_AUTOMATIC_STEPS),
             gravity: parameters.gravity,
             path,
             energy,
@@ -519,13 +593,14 @@ impl Unit {
             return Err(Error::NotAllowed {
                 name: "communication step size",
                 value: step_size,
-                allowed: "finite and > 0",
+                allowed: Allowed::Positive,
             });
         }
         // a host's round-off does not cost a step
-        let steps = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
+        let wanted = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
+        let steps = self.most_steps.map_or(wanted, |most| wanted.min(most));
         if steps > MAX_INTERNAL_STEPS {
-            let allowed = "0 (automatic), or at least a ten-millionth of the communication step";
+            let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
             return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
         }
         let segment = self.path.segment(&inputs.sample(), step_size);

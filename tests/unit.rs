@@ -230,3 +230,11 @@ fn a_step_that_differs_by_the_rounding_of_a_host_is_the_same_step() {
         assert!((a - b).norm() < 1e-9, "step {i}: {a} and {b}");
     }
 }
+
+#[test]
+fn a_short_stiff_rod_does_not_take_its_time() {
+    let parameters = Parameters { length: 1e-3, ..Parameters::default() };
+    let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+    unit.advance(&Inputs::default(), 0.01).unwrap();
+    assert_eq!(unit.outputs().steps, 1000);
+}

@@ -5,8 +5,8 @@
 //! stays. So the standard's state *error* does not exist here; a failed step may be repeated, or the run terminated.
 
 use super::description::{self, ALL, LOG_CATEGORIES};
-use super::variables::{self, Allowed, Kind, Variable};
-use crate::unit::{self, Inputs, Parameters, Unit};
+use super::variables::{self, Kind, Variable};
+use crate::unit::{self, Allowed, Inputs, Parameters, Unit};
 use std::fmt;
 
 /// Where an instance stands in its life.
@@ -139,7 +139,6 @@ pub enum Failure {
         variable: Variable,
         value: f64,
     },
-    ZeroQuaternion,
     BadArgument {
         argument: &'static str,
         value: f64,
@@ -245,12 +244,6 @@ impl fmt::Display for Failure {
             }
             Self::NotAllowed { variable, value } => {
                 write!(f, "{variable} = {value} is not allowed: {}", variable.allowed())
-            }
-            Self::ZeroQuaternion => {
-                write!(
-                    f,
-                    "base.orientation = 0, 0, 0, 0 is not allowed: a quaternion other than zero, normalised on use"
-                )
             }
             Self::BadArgument { argument, value, allowed } => {
                 write!(f, "{argument} = {value} is not allowed: {allowed}")
@@ -549,7 +542,6 @@ impl Instance {
         if let Some(stop) = self.experiment.stop.filter(|stop| end > stop + near) {
             return Err(Failure::PastStopTime { end, stop });
         }
-        self.check_orientation()?;
         let inputs = self.inputs.clone();
         let own_step = (time - self.time) + step_size;
         let unit = self.unit()?;
@@ -587,17 +579,9 @@ impl Instance {
     fn unit(&mut self) -> Result<&mut Unit, Failure> {
         let unit = match self.unit.take() {
             Some(unit) => unit,
-            None => {
-                self.check_orientation()?;
-                Box::new(Unit::new(&self.parameters, &self.inputs, self.experiment.tolerance)?)
-            }
+            None => Box::new(Unit::new(&self.parameters, &self.inputs, self.experiment.tolerance)?),
         };
         Ok(self.unit.insert(unit))
-    }
-
-    /// Seen only where it is used: between two calls of a host that sets component by component it may be zero.
-    fn check_orientation(&self) -> Result<(), Failure> {
-        if self.inputs.base_orientation.amax() > 0.0 { Ok(()) } else { Err(Failure::ZeroQuaternion) }
     }
 }
 

@@ -5,7 +5,7 @@
 //! variables, and the value reference of a variable is its place in that list. It is one list for all types, so that a
 //! reference taken for the wrong type is noticed.
 
-use crate::unit::{Inputs, Outputs, Parameters, STATIONS};
+use crate::unit::{Allowed, Inputs, Outputs, Parameters, STATIONS};
 use std::fmt;
 
 /// Type of a variable in the sense of FMI.
@@ -21,75 +21,15 @@ pub enum Kind {
     String,
 }
 
-/// What a variable may be set to, beyond being finite.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Allowed {
-    /// Every finite value.
-    Finite,
-    /// Above zero.
-    Positive,
-    /// Zero and above.
-    NonNegative,
-    /// Both ends included.
-    Between(f64, f64),
-    /// A whole number, both ends included.
-    Choice(i32, i32),
-}
-
-impl Allowed {
-    /// Whether `value` may be set. NaN and infinities never may.
-    pub fn contains(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Self::Finite => true,
-                Self::Positive => value > 0.0,
-                Self::NonNegative => value >= 0.0,
-                Self::Between(low, high) => (low..=high).contains(&value),
-                Self::Choice(low, high) => (f64::from(low)..=f64::from(high)).contains(&value),
-            }
-    }
-
-    /// The attribute `min`; that of a positive variable is the bound it must not reach, as FMI knows only closed ranges.
-    pub fn min(self) -> Option<f64> {
-        match self {
-            Self::Finite => None,
-            Self::Positive | Self::NonNegative => Some(0.0),
-            Self::Between(low, _) => Some(low),
-            Self::Choice(low, _) => Some(low.into()),
-        }
-    }
-
-    /// The attribute `max`.
-    pub fn max(self) -> Option<f64> {
-        match self {
-            Self::Finite | Self::Positive | Self::NonNegative => None,
-            Self::Between(_, high) => Some(high),
-            Self::Choice(_, high) => Some(high.into()),
-        }
-    }
-}
-
-impl fmt::Display for Allowed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Finite => write!(f, "finite"),
-            Self::Positive => write!(f, "finite and > 0"),
-            Self::NonNegative => write!(f, "finite and >= 0"),
-            Self::Between(low, high) => write!(f, "from {low} to {high}"),
-            Self::Choice(low, high) => write!(f, "a whole number from {low} to {high}"),
-        }
-    }
-}
-
 /// Where a variable lives; the second argument is the element of an array, 0 for a scalar.
 #[derive(Clone, Copy, Debug)]
 pub enum Slot {
     /// Fixed after initialisation.
-    Parameter(fn(&mut Parameters, usize) -> &mut f64, Allowed),
+    Parameter(fn(&mut Parameters, usize) -> &mut f64),
     /// May be set at communication points as well, from where the next step sees it.
-    Tunable(fn(&mut Parameters, usize) -> &mut f64, Allowed),
+    Tunable(fn(&mut Parameters, usize) -> &mut f64),
     /// Fixed after initialisation.
-    IntegerParameter(fn(&mut Parameters) -> &mut i32, Allowed),
+    IntegerParameter(fn(&mut Parameters) -> &mut i32),
     /// Fixed after initialisation.
     BooleanParameter(fn(&mut Parameters) -> &mut bool),
     /// Acts in the step that follows.
@@ -171,8 +111,8 @@ impl Variable {
     /// Its type.
     pub fn kind(&self) -> Kind {
         match self.row.slot {
-            Slot::Parameter(..) | Slot::Tunable(..) | Slot::Input(_) | Slot::Output(..) => Kind::Real,
-            Slot::IntegerParameter(..) | Slot::IntegerOutput(..) => Kind::Integer,
+            Slot::Parameter(_) | Slot::Tunable(_) | Slot::Input(_) | Slot::Output(..) => Kind::Real,
+            Slot::IntegerParameter(_) | Slot::IntegerOutput(..) => Kind::Integer,
             Slot::BooleanParameter(_) => Kind::Boolean,
         }
     }
@@ -184,13 +124,13 @@ impl Variable {
 
     /// Whether it may be set at communication points.
     pub fn is_settable_while_stepping(&self) -> bool {
-        matches!(self.row.slot, Slot::Input(_) | Slot::Tunable(..))
+        matches!(self.row.slot, Slot::Input(_) | Slot::Tunable(_))
     }
 
     /// What it may be set to.
     pub fn allowed(&self) -> Allowed {
         match self.row.slot {
-            Slot::Parameter(_, allowed) | Slot::Tunable(_, allowed) | Slot::IntegerParameter(_, allowed) => allowed,
+            Slot::Parameter(_) | Slot::Tunable(_) | Slot::IntegerParameter(_) => Parameters::allowed(&self.to_string()),
             Slot::BooleanParameter(_) => Allowed::Choice(0, 1),
             Slot::Input(_) | Slot::Output(..) | Slot::IntegerOutput(..) => Allowed::Finite,
         }
@@ -215,8 +155,8 @@ impl Variable {
     /// Its value where it is set, `None` for an output. Every type of the unit fits into an `f64` without loss.
     pub fn given(&self, parameters: &mut Parameters, inputs: &mut Inputs) -> Option<f64> {
         match self.row.slot {
-            Slot::Parameter(at, _) | Slot::Tunable(at, _) => Some(*at(parameters, self.element)),
-            Slot::IntegerParameter(at, _) => Some((*at(parameters)).into()),
+            Slot::Parameter(at) | Slot::Tunable(at) => Some(*at(parameters, self.element)),
+            Slot::IntegerParameter(at) => Some((*at(parameters)).into()),
             Slot::BooleanParameter(at) => Some(u8::from(*at(parameters)).into()),
             Slot::Input(at) => Some(*at(inputs, self.element)),
             Slot::Output(..) | Slot::IntegerOutput(..) => None,
@@ -235,9 +175,9 @@ impl Variable {
     /// Sets a parameter or an input to a value that [`Variable::allowed`] contains; an output stays.
     pub fn set(&self, parameters: &mut Parameters, inputs: &mut Inputs, value: f64) {
         match self.row.slot {
-            Slot::Parameter(at, _) | Slot::Tunable(at, _) => *at(parameters, self.element) = value,
+            Slot::Parameter(at) | Slot::Tunable(at) => *at(parameters, self.element) = value,
             // Exact: the value came from an i32, or is 0 or 1.
-            Slot::IntegerParameter(at, _) => *at(parameters) = value as i32,
+            Slot::IntegerParameter(at) => *at(parameters) = value as i32,
             Slot::BooleanParameter(at) => *at(parameters) = value != 0.0,
             Slot::Input(at) => *at(inputs, self.element) = value,
             Slot::Output(..) | Slot::IntegerOutput(..) => {}
@@ -283,61 +223,57 @@ const SHAPE: Initially = Initially::AllBut(&[
 /// Damping and the start in motion reach the accelerations, and these the reaction; only the time steps do not.
 const START: Initially = Initially::AllBut(&["step", "spectral_radius"]);
 
-use Allowed::{Between, Choice, Finite, NonNegative, Positive};
 use Slot::{BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
-
-/// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
-const MOST_CELLS: i32 = 100_000;
 
 /// The table.
 #[rustfmt::skip]
 pub static ROWS: &[Row] = &[
-    scalar("length", "m", Parameter(|p, _| &mut p.length, Positive),
+    scalar("length", "m", Parameter(|p, _| &mut p.length),
         "Arc length of the unstressed rod, > 0"),
-    scalar("radius", "m", Parameter(|p, _| &mut p.radius, Positive),
+    scalar("radius", "m", Parameter(|p, _| &mut p.radius),
         "Radius of the circular section, > 0"),
-    scalar("density", "kg/m3", Parameter(|p, _| &mut p.density, Positive),
+    scalar("density", "kg/m3", Parameter(|p, _| &mut p.density),
         "Density, > 0"),
-    scalar("youngs_modulus", "Pa", Parameter(|p, _| &mut p.youngs_modulus, Positive),
+    scalar("youngs_modulus", "Pa", Parameter(|p, _| &mut p.youngs_modulus),
         "Young's modulus, > 0"),
-    scalar("shear_modulus", "Pa", Parameter(|p, _| &mut p.shear_modulus, Positive),
+    scalar("shear_modulus", "Pa", Parameter(|p, _| &mut p.shear_modulus),
         "Shear modulus, > 0"),
-    scalar("section.area", "m2", Parameter(|p, _| &mut p.section_area, NonNegative),
+    scalar("section.area", "m2", Parameter(|p, _| &mut p.section_area),
         "Area of the section; 0 = from the radius"),
     array("section.second_moment", "m4", &["about d1", "about d2"],
-        Parameter(|p, k| &mut p.section_second_moment[k], NonNegative),
+        Parameter(|p, k| &mut p.section_second_moment[k]),
         "Second moment of area about a principal axis of the section; 0 = from the radius"),
-    scalar("section.torsion_constant", "m4", Parameter(|p, _| &mut p.section_torsion_constant, NonNegative),
+    scalar("section.torsion_constant", "m4", Parameter(|p, _| &mut p.section_torsion_constant),
         "Torsion constant of the section; 0 = sum of the second moments in use"),
-    scalar("section.shear_correction", "", Parameter(|p, _| &mut p.section_shear_correction, Positive),
+    scalar("section.shear_correction", "", Parameter(|p, _| &mut p.section_shear_correction),
         "Shear correction factor, > 0; used when extensible"),
-    array("rest_curvature", "1/m", DIRECTORS, Parameter(|p, k| &mut p.rest_curvature[k], Finite),
+    array("rest_curvature", "1/m", DIRECTORS, Parameter(|p, k| &mut p.rest_curvature[k]),
         "Curvature (about d1, d2) and twist (about d3) of the unstressed rod, body frame, d3 along the rod"),
-    array("gravity", "m/s2", XYZ, Tunable(|p, k| &mut p.gravity[k], Finite),
+    array("gravity", "m/s2", XYZ, Tunable(|p, k| &mut p.gravity[k]),
         "Acceleration of gravity, world frame"),
-    scalar("damping.bending", "s", Parameter(|p, _| &mut p.damping_bending, NonNegative),
+    scalar("damping.bending", "s", Parameter(|p, _| &mut p.damping_bending),
         "Kelvin-Voigt time constant of bending"),
-    scalar("damping.twist", "s", Parameter(|p, _| &mut p.damping_twist, NonNegative),
+    scalar("damping.twist", "s", Parameter(|p, _| &mut p.damping_twist),
         "Kelvin-Voigt time constant of twist"),
-    scalar("damping.drag", "N.s/m2", Parameter(|p, _| &mut p.damping_drag, NonNegative),
+    scalar("damping.drag", "N.s/m2", Parameter(|p, _| &mut p.damping_drag),
         "Linear drag: force per length and velocity, against the velocity in the world frame"),
-    scalar("tip.mass", "kg", Parameter(|p, _| &mut p.tip_mass, NonNegative),
+    scalar("tip.mass", "kg", Parameter(|p, _| &mut p.tip_mass),
         "Mass of a body whose centre is the tip point"),
-    scalar("tip.inertia", "kg.m2", Parameter(|p, _| &mut p.tip_inertia, NonNegative),
+    scalar("tip.inertia", "kg.m2", Parameter(|p, _| &mut p.tip_inertia),
         "Isotropic inertia of that body about the tip point"),
     scalar("extensible", "", BooleanParameter(|p| &mut p.extensible),
         "Whether the section shears and stretches"),
-    scalar("base.motion", "", IntegerParameter(|p| &mut p.base_motion, Choice(0, 2)),
+    scalar("base.motion", "", IntegerParameter(|p| &mut p.base_motion),
         "Which inputs move the base: 0 pose and twist, 1 pose only (twist derived), 2 twist only (pose integrated from the initial one)"),
-    scalar("cells", "", IntegerParameter(|p| &mut p.cells, Choice(0, MOST_CELLS)),
+    scalar("cells", "", IntegerParameter(|p| &mut p.cells),
         "Cells along the rod; 0 = chosen by the unit"),
-    scalar("stages", "", IntegerParameter(|p| &mut p.stages, Choice(0, 4)),
+    scalar("stages", "", IntegerParameter(|p| &mut p.stages),
         "Gauss points in a cell, 1 to 4; 0 = chosen by the unit"),
-    scalar("step", "s", Parameter(|p, _| &mut p.step, NonNegative),
+    scalar("step", "s", Parameter(|p, _| &mut p.step),
         "Every communication step is divided into equal steps not longer than this; 0 = chosen by the unit"),
-    scalar("tolerance", "", Parameter(|p, _| &mut p.tolerance, NonNegative),
+    scalar("tolerance", "", Parameter(|p, _| &mut p.tolerance),
         "Tolerance of the tip position relative to the length; 0 = that of the experiment, else 1e-3"),
-    scalar("spectral_radius", "", Parameter(|p, _| &mut p.spectral_radius, Between(0.0, 1.0)),
+    scalar("spectral_radius", "", Parameter(|p, _| &mut p.spectral_radius),
         "Spectral radius of the time integrator at infinite frequency: 0 damps most, 1 nothing"),
     scalar("start_in_equilibrium", "", BooleanParameter(|p| &mut p.start_in_equilibrium),
         "Whether the run starts from the static equilibrium under gravity and the initial inputs instead of the rest shape"),
