@@ -156,7 +156,8 @@ impl Time {
         }
     }
 
-    fn row(&self) -> Row {
+    /// The acceleration row; statics has the positions' one, with weight zero.
+    pub fn row(&self) -> Row {
         match self {
             Self::Static => Row::Positions,
             Self::Step { row, .. } => *row,
@@ -207,7 +208,9 @@ impl State {
             state.nodes[j + 1].turn = cell.kappa_rest * cell.length;
             state.nodes[j + 1].rotation = R_0 * so3::exp(&state.nodes[j + 1].turn);
         }
-        state.rebuild_positions(mesh, &Rod { compliance: Vec3::zeros(), ..Rod::circular(1.0, 1.0, 1.0, 1.0) });
+        state.nodes[0].position = base.position;
+        // without a force r_s = d₃, whatever the section
+        state.accumulate(mesh, |point, _| point.rotation.column(2).into_owned(), |section| &mut section.position);
         state.move_rigidly();
         state
     }
@@ -263,7 +266,7 @@ impl State {
     }
 
     /// Integrates r_s along the rod from the base.
-    pub fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
+    fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
         self.nodes[0].position = self.base.position;
         self.accumulate(mesh, |point, _| tangent(rod, point), |section| &mut section.position);
     }

@@ -229,10 +229,6 @@ impl Stepper {
         let Self { mesh, rod, system, sweep, old, trial, .. } = self;
         trial.copy_from(old);
         let (scales, rounding) = scales(mesh, rod, old, boundary, time);
-        let row = match time {
-            Time::Static => Row::Positions,
-            Time::Step { row, .. } => *row,
-        };
         let mut residual = f64::INFINITY;
         for iteration in 1..=max_iterations {
             let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
@@ -257,7 +253,7 @@ impl Stepper {
                 && force < (TOLERANCE * scales.force).max(ROUNDINGS * rounding)
                 && moment < (TOLERANCE * scales.moment).max(ROUNDINGS * rounding * mesh.length());
             // the last increment is taken in full: it is small
-            trial.apply(&sweep.nodes, &sweep.points, if converged { 1.0 } else { limited }, row);
+            trial.apply(&sweep.nodes, &sweep.points, if converged { 1.0 } else { limited }, time.row());
             if converged {
                 return Ok((iteration, residual));
             }

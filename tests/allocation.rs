@@ -8,6 +8,7 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Base, Boundary, Row, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
+use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use nalgebra::{Matrix3, Vector3};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -83,4 +84,16 @@ fn a_step_allocates_nothing() {
             assert_eq!(count, 0, "{stages} stages, {row:?}, {rod:?}");
         }
     }
+}
+
+#[test]
+fn a_communication_step_allocates_nothing() {
+    let mut unit = Unit::new(&Parameters::default(), &Inputs::default(), None).unwrap();
+    let inputs = Inputs { base_velocity: Vector3::new(0.1, 0.0, 0.0), ..Inputs::default() };
+    let count = allocations(|| {
+        for _ in 0..5 {
+            unit.advance(&inputs, 0.01).unwrap();
+        }
+    });
+    assert_eq!(count, 0);
 }
