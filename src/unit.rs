@@ -445,9 +445,11 @@ impl Parameters {
             // four points are right to 3e-4
             let load = rod.mass_per_length * self.gravity.norm()
                 + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
-            let bends = self.length * (load / rod.stiffness.x.min(rod.stiffness.y)).cbrt();
+            let softest = rod.stiffness.min();
+            let bends = self.length * (load / softest).cbrt();
+            let wound = turn + inputs.tip_moment.norm() * self.length / softest;
             let order = 2.0 * stages as f64;
-            let cells = (0.7 * bends).max(turn).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
+            let cells = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
             cells.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS) as usize
         };
         if turn >= MAX_CELL_TURN * cells as f64 {

@@ -97,6 +97,8 @@ struct Outcome {
     reference_residual: f64,
     /// Difference of the sweep and the reference.
     error: f64,
+    /// The residual and the error after the sweep has solved once more, for its own residual.
+    refined: [f64; 2],
     /// Difference of the LU without refinement and the reference.
     lu_error: f64,
 }
@@ -131,7 +133,13 @@ fn compare(mesh: &Mesh, system: &System, sweep: &mut Sweep) -> Outcome {
         relative(&equations, |i| missed[i].abs(), |i| size[i] + right[i].abs())
     };
     let error = |x: &[f64]| relative(&unknowns, |i| (x[i] - reference[i]).abs(), |i| reference[i].abs());
+    let missed: Vec<Vector3<f64>> =
+        matrix.residual(&mine, &right).chunks_exact(3).map(Vector3::from_column_slice).collect();
+    let again = full.with_right(system, &missed);
+    sweep.solve(&again).unwrap();
+    let refined: Vec<f64> = mine.iter().zip(swept(&layout, &again, sweep)).map(|(x, dx)| x + dx).collect();
     Outcome {
+        refined: [residual(&refined), error(&refined)],
         residual: residual(&mine),
         reference_residual: residual(&reference),
         error: error(&mine),
@@ -155,15 +163,17 @@ fn check(name: &str, rod: &Rod, mesh: &Mesh, dt: Option<f64>, row: Row) -> Outco
     let outcome = compare(mesh, &system, &mut sweep);
 
     // The inertia of a cell over its bending stiffness. A cell much longer than the bending wave of a step, 1 ≪ (h/λ)⁴, moves
-    // as it is pushed whatever its stiffness, and its moments are differences of larger ones: that many roundings are lost.
-    // Newton makes them good in its next iteration.
+    // as it is pushed whatever its stiffness, and its moments at the nodes are differences of larger ones: roundings are lost, in
+    // the LU as well. Measured: a hundredth of that many in the residual, a twentieth in the solution, all at 1e-5 s on 30
+    // cells and fewer. The sweep's next solve, which is Newton's next iteration, makes them good.
     let h = mesh.length() / mesh.cells.len() as f64;
     let inertia = dt.map_or(0.0, |dt| rod.mass_per_length * scheme.rate_weight(dt).powi(2));
     let lost = f64::EPSILON * inertia * h.powi(4) / rod.stiffness.x;
     let scene = format!("{name}, {} × {}, {dt:?} s, {row:?}: {outcome:?}", mesh.cells.len(), mesh.rule.stages);
     assert!(outcome.reference_residual < 1e-15, "no reference: {scene}");
-    assert!(outcome.residual < 1e-12 + lost, "{scene}");
-    assert!(outcome.error < 1e-9 + lost, "{scene}");
+    assert!(outcome.residual < 1e-12 + 0.01 * lost, "{scene}");
+    assert!(outcome.error < 1e-9 + 0.05 * lost, "{scene}");
+    assert!(outcome.refined[0] < 1e-12 && outcome.refined[1] < 1e-9, "{scene}");
     outcome
 }
 

@@ -134,4 +134,24 @@ impl Full {
         (right[row], right[row + 1]) = (n, m);
         Self { layout, entries, right }
     }
+
+    /// The same system with another right-hand side.
+    #[allow(dead_code)]
+    pub fn with_right(&self, system: &System, right: &[Vector3<f64>]) -> System {
+        let mut other = system.clone();
+        other.base = (right[0], right[1]);
+        for (j, ends) in other.cells.iter_mut().enumerate() {
+            let mut rows = right[self.layout.equations(j)..].iter().map(|b| -b);
+            let mut next = || rows.next().expect("a row for every equation");
+            (ends.e_n, ends.e_m) = (next(), next());
+            for point in &mut other.points[j * self.layout.stages..][..self.layout.stages] {
+                (point.e_log, point.e_w, point.e_n) = (next(), next(), next());
+                (point.e_m, point.e_law) = (next(), next());
+            }
+            (ends.e_log, ends.e_w) = (next(), next());
+        }
+        let row = self.layout.blocks() - 2;
+        (other.tip.n, other.tip.m) = (right[row], right[row + 1]);
+        other
+    }
 }
