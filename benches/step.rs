@@ -1,8 +1,8 @@
 //! Work and time of one Newton iteration, per cell: `cargo bench --bench step`.
 //!
-//! Instructions are counted by callgrind, if it is installed: the program runs itself under it and takes the difference of two
-//! runs, so that what is counted is one iteration and nothing else. Times are medians. The rod is of rubber, twisted and bent,
-//! on a turning base.
+//! Instructions are counted by callgrind, if it is installed: the program runs itself under it and takes the difference
+//! of two runs, so that what is counted is one iteration and nothing else. Times are medians. The rod is of rubber,
+//! twisted and bent, on a turning base.
 #![allow(missing_docs)]
 
 // the tests use the rest of it
@@ -142,8 +142,8 @@ fn sweep_and_lu(iteration: &mut Iteration, cells: usize) -> (f64, f64) {
     (sweep, median((0..5).map(sample).collect()))
 }
 
-/// Seconds of a communication step of the smallest rod at rest: by the library, by `fmi2DoStep`, and by setting the 19 inputs, the
-/// step and getting 25 outputs. Medians of many, in turn.
+/// Seconds of a communication step of the smallest rod at rest: by the library, by `fmi2DoStep`, and by setting the 19
+/// inputs, the step and getting 25 outputs. Medians of many, in turn.
 fn interface() -> Result<[f64; 3], Box<dyn std::error::Error>> {
     const STEP: f64 = 1e-3;
     let fmu = Fmu::from_library(&package::library()?)?;

@@ -6,9 +6,10 @@
 //! (1−α) ẋᵢ + α ẋᵢ₋₁ = (1−β) vᵢ + β vᵢ₋₁          xᵢ = xᵢ₋₁ + Δt [(1−γ) ẋᵢ₋₁ + γ ẋᵢ]
 //! ```
 //!
-//! v is the rate that enters the equations of motion at tᵢ; the auxiliary rate ẋ only carries memory. Applied to x and then
-//! to v it yields the acceleration a. Second order needs α − β + γ = ½; the spectral radius at infinite frequency is then
-//! max(β/(1−β), (1−γ)/γ), and one parameter ρ∞ = −λ∞ gives all three (Chung and Hulbert 1993; the paper, section 4.2).
+//! v is the rate that enters the equations of motion at tᵢ; the auxiliary rate ẋ only carries memory. Applied to x and
+//! then to v it yields the acceleration a. Second order needs α − β + γ = ½; the spectral radius at infinite frequency
+//! is then max(β/(1−β), (1−γ)/γ), and one parameter ρ∞ = −λ∞ gives all three (Chung and Hulbert 1993; the paper,
+//! section 4.2).
 //!
 //! On a smooth motion the scheme's rates differ from the true ones by a *shift* that depends on Δt,
 //!
@@ -16,9 +17,9 @@
 //! ẋᵢ = v + (½−γ) Δt a + e Δt² ȧ,  e = 1/6 − γ(1−γ)          vᵢ = v + (e + αγ − β/2) Δt² ȧ
 //! ```
 //!
-//! up to O(Δt³). A start, and a change of Δt or of the scheme, put the rates there ([`Scheme::started`], [`Scheme::rebased`]); otherwise the acceleration of
-//! whatever is too stiff to follow its own dynamics, and with it the reaction, begins every such step with an error O(Δt)
-//! that decays slowly, and never at ρ∞ = 1.
+//! up to O(Δt³). A start, and a change of Δt or of the scheme, put the rates there ([`Scheme::started`],
+//! [`Scheme::rebased`]); otherwise the acceleration of whatever is too stiff to follow its own dynamics, and with it
+//! the reaction, begins every such step with an error O(Δt) that decays slowly, and never at ρ∞ = 1.
 
 use nalgebra::Vector3;
 
@@ -129,9 +130,9 @@ impl Scheme {
         }
     }
 
-    /// The history after steps of `dt` with the scheme `before`, for steps of `new` with this one: the auxiliary rates move with
-    /// their shift, in first order. (In second order, rates of what is too stiff to be followed would feed on themselves where
-    /// the step changes often.)
+    /// The history after steps of `dt` with the scheme `before`, for steps of `new` with this one: the auxiliary rates
+    /// move with their shift, in first order. (In second order, rates of what is too stiff to be followed would feed on
+    /// themselves where the step changes often.)
     pub fn rebased(&self, motion: &Motion, before: &Self, dt: f64, new: f64) -> Motion {
         let first = self.shift()[0] * new - before.shift()[0] * dt;
         let mut rebased = *motion;

@@ -6,8 +6,8 @@ use crate::rod::Rod;
 use crate::so3;
 use nalgebra::Vector3;
 
-/// Energies, and works since the start, J. kinetic + elastic + gravity + dissipated grows by work_base + work_tip, up to the
-/// second order of the time scheme.
+/// Energies, and works since the start, J. kinetic + elastic + gravity + dissipated grows by work_base + work_tip, up
+/// to the second order of the time scheme.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Of the rod and the body at its tip.

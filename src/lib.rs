@@ -1,8 +1,9 @@
 //! One elastic rod (cable, hose, umbilical, catheter, spring, hair) as an FMI 2.0 co-simulation unit.
 //!
-//! The rod is the dynamic Cosserat rod of Sobottka, Lay and Weber (*Stable Integration of the Dynamic Cosserat Equations with
-//! Application to Hair Modeling*, 2008): a two-point boundary value problem in space, integrated in time by the generalized-α
-//! method and solved by Newton's method along the whole rod at once. "eq" and "section" in these pages are that paper's.
+//! The rod is the dynamic Cosserat rod of Sobottka, Lay and Weber (*Stable Integration of the Dynamic Cosserat
+//! Equations with Application to Hair Modeling*, 2008): a two-point boundary value problem in space, integrated in time
+//! by the generalized-α method and solved by Newton's method along the whole rod at once. "eq" and "section" in these
+//! pages are that paper's.
 //!
 //! # Layers
 //!
@@ -13,20 +14,21 @@
 //! ```
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
-//! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command line, and
-//!    the rest compiles.
-//! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread, clock or
-//!    mutable static in the library.
-//! 4. [`sweep`] knows blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] knows which unknowns a section has.
-//! 5. [`pose::State`] is plain data; everything a later step depends on is in it. Rebuilding the storage around it changes no bit
-//!    of any result. Same inputs, same bits.
-//! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry with
-//!    smaller steps lives in [`mod@unit`], never in Newton.
+//! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
+//!    line, and the rest compiles.
+//! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread,
+//!    clock or mutable static in the library.
+//! 4. [`sweep`] knows blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] knows which unknowns a section
+//!    has.
+//! 5. [`pose::State`] is plain data; everything a later step depends on is in it. Rebuilding the storage around it changes
+//!    no bit of any result. Same inputs, same bits.
+//! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry
+//!    with smaller steps lives in [`mod@unit`], never in Newton.
 //!
 //! # Notation
 //!
-//! SI units. The world frame is right-handed; body-frame components refer to R = [d₁ d₂ d₃], body to world, d₃ along the rod.
-//! `_s` and `_t` are derivatives by arc length and time.
+//! SI units. The world frame is right-handed; body-frame components refer to R = [d₁ d₂ d₃], body to world, d₃ along
+//! the rod. `_s` and `_t` are derivatives by arc length and time.
 //!
 //! | symbol | identifier | unit | meaning |
 //! |---|---|---|---|

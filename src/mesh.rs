@@ -1,7 +1,7 @@
 //! The cells along the rod and the Gauss rule within a cell.
 //!
-//! An s-stage Gauss rule collocates Y' at the points c_k: Y_k = Y₀ + h Σ a_kl Y'_l, Y₁ = Y₀ + h Σ b_l Y'_l, of order 2s.
-//! s = 1 is the midpoint box.
+//! An s-stage Gauss rule collocates Y' at the points c_k: Y_k = Y₀ + h Σ a_kl Y'_l, Y₁ = Y₀ + h Σ b_l Y'_l, of order
+//! 2s. s = 1 is the midpoint box.
 
 use nalgebra::{Matrix4, Vector3};
 

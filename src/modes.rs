@@ -1,8 +1,9 @@
 //! Natural frequencies and modes about a static equilibrium, from the blocks of the statics.
 //!
-//! The sweep solves K x = f along the rod; with f = M y it is the operator K⁻¹M, whose eigenvalues are 1/ω². Its largest ones
-//! come from a block Krylov space (several starting vectors, since a round rod has its bending modes in pairs), orthogonal in
-//! the kinetic energy. An unstable equilibrium has a mode with ω² < 0, which the same space finds among the largest |1/ω²|.
+//! The sweep solves K x = f along the rod; with f = M y it is the operator K⁻¹M, whose eigenvalues are 1/ω². Its
+//! largest ones come from a block Krylov space (several starting vectors, since a round rod has its bending modes in
+//! pairs), orthogonal in the kinetic energy. An unstable equilibrium has a mode with ω² < 0, which the same space finds
+//! among the largest |1/ω²|.
 
 // R is the paper's letter
 #![allow(non_snake_case)]
@@ -23,8 +24,8 @@ pub struct Mode {
     pub omega_squared: f64,
     /// Displacement of the nodes, world frame, base first; the largest component is 1.
     pub shape: Vec<Vector3<f64>>,
-    /// Part of the kinetic energy that is in the motion of the centreline; the rest turns the sections. Near 0 for torsion, whose
-    /// `shape` says nothing.
+    /// Part of the kinetic energy that is in the motion of the centreline; the rest turns the sections. Near 0 for
+    /// torsion, whose `shape` says nothing.
     pub travel: f64,
 }
 
@@ -38,8 +39,8 @@ impl Mode {
 /// Displacements (position, rotation) of all points, then of the tip.
 type Field = Vec<(Vector3<f64>, Vector3<f64>)>;
 
-/// The `count` modes nearest to ω² = 0 (fewer if the mesh has fewer), by ascending ω², about the state of `stepper`, which is to be
-/// an equilibrium under `boundary`.
+/// The `count` modes nearest to ω² = 0 (fewer if the mesh has fewer), by ascending ω², about the state of `stepper`,
+/// which is to be an equilibrium under `boundary`.
 ///
 /// # Errors
 /// [`Diverged`] if the equilibrium is indifferent: its stiffness is singular.

@@ -1,15 +1,16 @@
 //! The motion of the base between communication points: one C¹ path through what the host samples.
 //!
-//! Within a communication step of length H the acceleration of the path is linear in time; the path begins with the velocity
-//! it had and ends with
+//! Within a communication step of length H the acceleration of the path is linear in time; the path begins with the
+//! velocity it had and ends with
 //!
 //! ```text
 //! v* = v + v̇ H + (r − r_path)/T
 //! ```
 //!
-//! v is the sampled velocity, v̇ its change over the last step, and the slope of the acceleration the change of v̇. The last term
-//! feeds the distance between the sampled position and the path back over the time T: positions rounded by a few digits do not shake the acceleration, and a path
-//! that missed something returns. Rotations do the same through exp, in world axes.
+//! v is the sampled velocity, v̇ its change over the last step, and the slope of the acceleration the change of v̇. The
+//! last term feeds the distance between the sampled position and the path back over the time T: positions rounded by a
+//! few digits do not shake the acceleration, and a path that missed something returns. Rotations do the same through
+//! exp, in world axes.
 
 use crate::pose::Base;
 use crate::so3;
@@ -18,7 +19,8 @@ use nalgebra::{Matrix3, Vector3};
 type Vec3 = Vector3<f64>;
 type Mat3 = Matrix3<f64>;
 
-/// Shortest time over which a distance between samples and path is fed in, s; with a derived twist, whose own errors it corrects.
+/// Shortest time over which a distance between samples and path is fed in, s; with a derived twist, whose own errors it
+/// corrects.
 const FEED_TIME: [f64; 2] = [0.1, 0.02];
 /// The same in communication steps, so that the feedback is far from its stability limit of two steps.
 const FEED_STEPS: [f64; 2] = [10.0, 5.0];
@@ -160,7 +162,8 @@ impl Path {
         segment
     }
 
-    /// Fading-memory fit of a parabola to the poses (the g-h-k filter with equal roots θ): position, twist and its rate.
+    /// Fading-memory fit of a parabola to the poses (the g-h-k filter with equal roots θ): position, twist and its
+    /// rate.
     fn track(&mut self, sample: &Sample) {
         let step = self.last_step;
         if self.samples == 0 {

@@ -1,4 +1,5 @@
-//! The pose formulation: r, R, n, m and the acceleration a in the world frame, collocated at the Gauss points of every cell.
+//! The pose formulation: r, R, n, m and the acceleration a in the world frame, collocated at the Gauss points of every
+//! cell.
 //!
 //! ```text
 //! r_s = R (e₃ + C Rᵀn)          R_s = R κ̂,  κ = κ̂₀ + K⁻¹ Rᵀm          (eqs 1, 11; C = 0: eq 8)
@@ -7,12 +8,13 @@
 //! a_s = R (ω × (ω × e₃) + ω_t × e₃)                                   (the second time derivative of eq 8)
 //! ```
 //!
-//! ω and ω_t at a Gauss point follow from its new rotation and its history through the time scheme. All of r or a, R, n and m
-//! are iterated ('lifted'), so that Newton sees the equations as they stand here and not their composition.
+//! ω and ω_t at a Gauss point follow from its new rotation and its history through the time scheme. All of r or a, R, n
+//! and m are iterated ('lifted'), so that Newton sees the equations as they stand here and not their composition.
 //!
-//! The acceleration has two rows. [`Row::Rotations`] is the one above: the section rotations are then the only variables with a
-//! history and the rod is an ordinary differential equation. [`Row::Positions`] takes a from the history of r instead; it is the
-//! row of the extensible rod, and for the inextensible one the more forgiving of the two at steps that do not resolve the motion.
+//! The acceleration has two rows. [`Row::Rotations`] is the one above: the section rotations are then the only
+//! variables with a history and the rod is an ordinary differential equation. [`Row::Positions`] takes a from the
+//! history of r instead; it is the row of the extensible rod, and for the inextensible one the more forgiving of the
+//! two at steps that do not resolve the motion.
 
 // one-letter names are the paper's: R, I, J, W are matrices
 #![allow(non_snake_case)]
@@ -34,7 +36,8 @@ pub struct Section {
     pub position: Vec3,
     /// R.
     pub rotation: Mat3,
-    /// Φ: the rotation from the cell's first node (of a node: from the node before it), rad; continuous beyond a half turn.
+    /// Φ: the rotation from the cell's first node (of a node: from the node before it), rad; continuous beyond a half
+    /// turn.
     pub turn: Vec3,
     /// n, N: what the part s⁺ exerts on the part s⁻.
     pub force: Vec3,
@@ -228,7 +231,8 @@ impl State {
         self.dt = 0.0;
     }
 
-    /// Puts the auxiliary rates where a step of `dt` s with `scheme` wants them: at a start, and where either has changed.
+    /// Puts the auxiliary rates where a step of `dt` s with `scheme` wants them: at a start, and where either has
+    /// changed.
     pub fn prepare(&mut self, scheme: Scheme, dt: f64) {
         // what is first order anyway is left as it is: α + γ = 1 and β = 0 then is implicit Euler to rounding
         if (scheme, dt) == (self.scheme, self.dt) || !scheme.is_second_order() {
@@ -438,8 +442,8 @@ impl State {
     }
 }
 
-/// The solution of a start at the tip. The section there follows its neighbour unless a body makes it a variable of its own: its
-/// extrapolation along the cells would amplify whatever is not smooth at a start.
+/// The solution of a start at the tip. The section there follows its neighbour unless a body makes it a variable of its
+/// own: its extrapolation along the cells would amplify whatever is not smooth at a start.
 fn end_of(rod: &Rod, nodes: &[Increment], points: &[Increment]) -> Increment {
     let (tip, last) = (nodes[nodes.len() - 1], points[points.len() - 1]);
     if rod.tip_inertia > 0.0 { tip } else { Increment { phi: last.phi, ..tip } }
@@ -654,8 +658,8 @@ pub fn assemble(
     }
 }
 
-/// u at the tip of an iterate, only needed where a body sits on the tip of a rod with drag. Its derivative is left out of the
-/// Jacobian (it depends on every section): Newton's rate there is ν Δt instead of quadratic.
+/// u at the tip of an iterate, only needed where a body sits on the tip of a rod with drag. Its derivative is left out
+/// of the Jacobian (it depends on every section): Newton's rate there is ν Δt instead of quadratic.
 fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, time: &Time) -> Vec3 {
     let stages = mesh.rule.stages;
     let mut u = boundary.base.velocity;
@@ -668,8 +672,8 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
     u
 }
 
-/// The equations of motion at an instant as linear equations for the accelerations: φ stands for R ω_t, w for a + ν u; the
-/// moments at the points are those of the law. Sets these moments in `state`.
+/// The equations of motion at an instant as linear equations for the accelerations: φ stands for R ω_t, w for a + ν u;
+/// the moments at the points are those of the law. Sets these moments in `state`.
 pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundary: &Boundary, system: &mut System) {
     let drag = rod.drag_rate();
     let base = &boundary.base;
@@ -700,8 +704,8 @@ pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundar
     assemble_rates(mesh, rod, state, state.nodes[0].acceleration, rates, tip, system);
 }
 
-/// The time derivative of those equations: φ stands for R ω_tt, w for the rate of a + ν u. `sweep` holds the accelerations.
-/// Sets κ_tt in `state`.
+/// The time derivative of those equations: φ stands for R ω_tt, w for the rate of a + ν u. `sweep` holds the
+/// accelerations. Sets κ_tt in `state`.
 pub fn assemble_jerks(mesh: &Mesh, rod: &Rod, state: &mut State, sweep: &Sweep, system: &mut System) {
     let drag = rod.drag_rate();
     let e_3 = Vec3::z();
@@ -834,8 +838,8 @@ fn set_loads(
     ends.e_m = sum(-h, b, m_s);
 }
 
-/// Makes the residuals of `system` the inertia of the displacements `y` (position, rotation; of all points, then the tip)
-/// vibrating with ω = 1.
+/// Makes the residuals of `system` the inertia of the displacements `y` (position, rotation; of all points, then the
+/// tip) vibrating with ω = 1.
 pub fn load_with_inertia(mesh: &Mesh, rod: &Rod, state: &State, y: &[(Vec3, Vec3)], system: &mut System) {
     let stages = mesh.rule.stages;
     let zero = [Vec3::zeros(); MAX_STAGES];

@@ -6,7 +6,8 @@
 //! Rᵀm = K (κ − κ̂ + τ κ_t)          r_s = R (e₃ + C Rᵀn)
 //! ```
 //!
-//! C = 0 is the Kirchhoff rod of the paper (eq 11 and section 3.2), not a second model. τ are Kelvin-Voigt time constants.
+//! C = 0 is the Kirchhoff rod of the paper (eq 11 and section 3.2), not a second model. τ are Kelvin-Voigt time
+//! constants.
 
 use nalgebra::Vector3;
 use std::f64::consts::PI;

@@ -7,8 +7,8 @@
 //! κ   = J_r(Φ) Φ_s        J_r(Φ)   = 1 − b(φ) Φ̂ + d(φ) Φ̂²      b = (1 − cos φ)/φ²,  d = (φ − sin φ)/φ³
 //! ```
 //!
-//! (φ = |Φ|; J_r is the right Jacobian of SO(3)). All maps are smooth at Φ = 0 and use series there; J_r⁻¹ ends at φ = 2π,
-//! `log` returns |Φ| ≤ π.
+//! (φ = |Φ|; J_r is the right Jacobian of SO(3)). All maps are smooth at Φ = 0 and use series there; J_r⁻¹ ends at φ =
+//! 2π, `log` returns |Φ| ≤ π.
 
 use nalgebra::{Matrix3, Vector3, Vector4};
 use std::f64::consts::{PI, TAU};
@@ -129,7 +129,8 @@ pub fn log(rotation: &Matrix3<f64>) -> Vector3<f64> {
     v * (2.0 * norm.atan2(q[0]) / norm)
 }
 
-/// The Φ with exp(Φ̂) = R that is nearest to `reference`, of the two of least length: so Φ stays continuous beyond a half turn.
+/// The Φ with exp(Φ̂) = R that is nearest to `reference`, of the two of least length: so Φ stays continuous beyond a
+/// half turn.
 #[inline]
 pub fn log_near(rotation: &Matrix3<f64>, reference: &Vector3<f64>) -> Vector3<f64> {
     let phi = log(rotation);
@@ -252,7 +253,8 @@ mod tests {
             let rotation = exp(&phi);
             // a few roundings of entries of size 1
             assert!((rotation.transpose() * rotation - Matrix3::identity()).amax() < 1e-15);
-            // near the half turn the rotation vector is conditioned like 1/(π − φ) only through its sign: compare rotations
+            // near the half turn the rotation vector is conditioned like 1/(π − φ) only through its sign: compare
+            // rotations
             assert!((exp(&log(&rotation)) - rotation).amax() < 2e-15, "{phi}");
             if phi.norm() < 3.0 {
                 assert!((log(&rotation) - phi).norm() <= 4e-15 * (1.0 + phi.norm()), "{phi}");

@@ -1,4 +1,5 @@
-//! From one state to the next: Newton on the lifted unknowns, for a time step and for statics, and the consistent start.
+//! From one state to the next: Newton on the lifted unknowns, for a time step and for statics, and the consistent
+//! start.
 //!
 //! A step never changes the state it starts from; the new one is in [`Stepper::state`] after success only.
 
@@ -21,14 +22,16 @@ const TOLERANCE: f64 = 1e-8;
 /// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
 const ROUNDINGS: f64 = 256.0;
 
-/// Turn of a section in a step up to which the step resolves the motion, rad: well below the angles (about 1 rad) where Newton on the
-/// accelerations of the rotations begins to fail and energy to grow.
+/// Turn of a section in a step up to which the step resolves the motion, rad: well below the angles (about 1 rad) where
+/// Newton on the accelerations of the rotations begins to fail and energy to grow.
 const RESOLVED: f64 = 0.35;
 /// The same to come back from steps that did not, lower so that the two do not alternate.
 const RESOLVED_AGAIN: f64 = 0.25;
-/// Turn of a section in the first step by its initial acceleration alone, up to which that acceleration says how the motion begins.
+/// Turn of a section in the first step by its initial acceleration alone, up to which that acceleration says how the
+/// motion begins.
 const RESOLVED_START: f64 = 0.01;
-/// Change of the accelerations in a step, relative to them, below which the auxiliary rates may be moved to another scheme.
+/// Change of the accelerations in a step, relative to them, below which the auxiliary rates may be moved to another
+/// scheme.
 const SMOOTH: f64 = 0.25;
 /// Turn of a section in a step, rad, that no change of its acceleration need be smaller than.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -128,11 +131,12 @@ impl Stepper {
 
     /// One step of `dt` s to `boundary` in the way that suits it.
     ///
-    /// A step that resolves the motion uses `scheme` and the accelerations of the section rotations, whose reaction does not ring.
-    /// One that would turn a section further than it can follow, or one that Newton loses, uses the accelerations of the
-    /// positions with spectral radius 0: there Newton converges at any step size and energy falls. Such steps begin with implicit
-    /// Euler, which needs no auxiliary rates, and keep spectral radius 0 until the accelerations are smooth. A start whose
-    /// accelerations do not say how the motion begins (damped, released from a shape out of balance) begins the same way.
+    /// A step that resolves the motion uses `scheme` and the accelerations of the section rotations, whose reaction
+    /// does not ring. One that would turn a section further than it can follow, or one that Newton loses, uses the
+    /// accelerations of the positions with spectral radius 0: there Newton converges at any step size and energy falls.
+    /// Such steps begin with implicit Euler, which needs no auxiliary rates, and keep spectral radius 0 until the
+    /// accelerations are smooth. A start whose accelerations do not say how the motion begins (damped, released from a
+    /// shape out of balance) begins the same way.
     ///
     /// # Errors
     /// [`Diverged`]; the state is as before.
@@ -179,7 +183,8 @@ impl Stepper {
             .map_err(|diverged| Diverged { iterations: lost + diverged.iterations, ..diverged })
     }
 
-    /// One step of `dt` s to `boundary` with a given scheme and acceleration row; a rod that shears or stretches has only
+    /// One step of `dt` s to `boundary` with a given scheme and acceleration row; a rod that shears or stretches has
+    /// only
     /// [`Row::Positions`].
     ///
     /// # Errors
@@ -319,9 +324,9 @@ impl Stepper {
         Ok((&sweep.nodes, &sweep.points))
     }
 
-    /// Consistent accelerations, and their rates, of the present state with its velocities: what the equations of motion give
-    /// for ω_t and a at a start, where no history tells them. A rod that shears or stretches keeps accelerations of zero (and
-    /// takes its first step by implicit Euler): its centreline has dynamics of its own.
+    /// Consistent accelerations, and their rates, of the present state with its velocities: what the equations of
+    /// motion give for ω_t and a at a start, where no history tells them. A rod that shears or stretches keeps
+    /// accelerations of zero (and takes its first step by implicit Euler): its centreline has dynamics of its own.
     ///
     /// # Errors
     /// [`Diverged`] if the equations of a cell are singular; the state is as before.

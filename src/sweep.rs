@@ -1,9 +1,9 @@
 //! One linear solve along the rod in O(N): elimination from the tip to the base, substitution from the base to the tip.
 //! It knows blocks and no rod.
 //!
-//! The unknowns are increments of the world rotation φ, of an accumulated vector w (position or acceleration), of the force
-//! n and of the moment m, at the nodes and at the Gauss points k of every cell. A cell of length h between the nodes 0 and
-//! 1, with residuals e and the collocation matrix a, reads
+//! The unknowns are increments of the world rotation φ, of an accumulated vector w (position or acceleration), of the
+//! force n and of the moment m, at the nodes and at the Gauss points k of every cell. A cell of length h between the
+//! nodes 0 and 1, with residuals e and the collocation matrix a, reads
 //!
 //! ```text
 //! Φ_k = h Σ a_kl g_l − e            φ_k = φ₀ + T_k Φ_k
@@ -13,9 +13,9 @@
 //! L_k g_k + M_k Φ_k + X_k φ_k − m_k = −e
 //! ```
 //!
-//! and the same sums with b_l in place of a_kl (of b_l − a_kl) at node 1 (at node 0). From the tip to the base the sweep
-//! carries (n, m) = P (w, φ) + p; within a cell only the increments g_l of the strain (and, where Q ≠ 0, w'_l) need a
-//! solve, and the inextensible or rigid limit does them no harm.
+//! and the same sums with b_l in place of a_kl (of b_l − a_kl) at node 1 (at node 0). From the tip to the base the
+//! sweep carries (n, m) = P (w, φ) + p; within a cell only the increments g_l of the strain (and, where Q ≠ 0, w'_l)
+//! need a solve, and the inextensible or rigid limit does them no harm.
 
 use crate::mesh::{Gauss, MAX_STAGES};
 use nalgebra::{Matrix3, Vector3};
@@ -169,8 +169,8 @@ pub struct Singular {
     pub cell: usize,
 }
 
-/// Three affine functions of the unknowns u of a cell and of w₀ and φ₀: rows of the coefficients of u, w₀, φ₀ and 1, so that
-/// the inner loops run along them.
+/// Three affine functions of the unknowns u of a cell and of w₀ and φ₀: rows of the coefficients of u, w₀, φ₀ and 1, so
+/// that the inner loops run along them.
 #[derive(Clone, Copy)]
 struct Affine<const W: usize>([[f64; W]; 3]);
 
@@ -411,7 +411,8 @@ impl Sweep {
         Ok(())
     }
 
-    /// From the base to the tip: the increments, for the correction `system.base` and the residuals that were eliminated.
+    /// From the base to the tip: the increments, for the correction `system.base` and the residuals that were
+    /// eliminated.
     pub fn substitute(&mut self, system: &System) {
         let (a, b) = (&self.rule.a, &self.rule.b);
         let stages = self.rule.stages;
@@ -440,7 +441,8 @@ impl Sweep {
             for (k, point) in points.iter().enumerate() {
                 let log = sum(-point.e_log, &a[k], &strain);
                 increments[k].phi = phi_0 + point.spin * log;
-                // by its law: from the balance it would be a difference of larger moments where a cell is soft and heavy
+                // by its law: from the balance it would be a difference of larger moments where a cell is soft and
+                // heavy
                 increments[k].m = point.law_strain * strain[k]
                     + point.law_log * log
                     + point.law_phi * increments[k].phi

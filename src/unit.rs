@@ -1,7 +1,7 @@
 //! The model without FMI: parameters and inputs in, one rod advanced by communication steps, outputs out.
 //!
-//! A communication step is cut into equal internal steps that land exactly on its end. One that diverges is halved, and its
-//! halves again if need be; if that does not help either, the unit is as it was before the communication step.
+//! A communication step is cut into equal internal steps that land exactly on its end. One that diverges is halved, and
+//! its halves again if need be; if that does not help either, the unit is as it was before the communication step.
 
 use crate::alpha::Scheme;
 use crate::energy::Energy;
@@ -194,7 +194,8 @@ impl Allowed {
             }
     }
 
-    /// The attribute `min`; that of a positive variable is the bound it must not reach, as FMI knows only closed ranges.
+    /// The attribute `min`; that of a positive variable is the bound it must not reach, as FMI knows only closed
+    /// ranges.
     pub fn min(self) -> Option<f64> {
         match self {
             Self::Finite | Self::Such(_) => None,
@@ -309,8 +310,8 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Distance of the sampled pose from the path, as a part of the rod's length or in rad, beyond which pose and twist disagree; half a
-/// communication step's motion is allowed on top, since the first steps do not know the acceleration.
+/// Distance of the sampled pose from the path, as a part of the rod's length or in rad, beyond which pose and twist
+/// disagree; half a communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
 /// Most internal steps chosen for a communication step: what is faster than that is damped, not followed.
@@ -430,8 +431,8 @@ impl Parameters {
         }
     }
 
-    /// The cells: as given, or as many of four Gauss points as the bending length under the weight, the rest curvature and the
-    /// tolerance ask for.
+    /// The cells: as given, or as many of four Gauss points as the bending length under the weight, the rest curvature
+    /// and the tolerance ask for.
     ///
     /// # Errors
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
@@ -441,8 +442,8 @@ impl Parameters {
         let cells = if self.cells > 0 {
             self.cells as usize
         } else {
-            // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five cells of
-            // four points are right to 3e-4
+            // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five
+            // cells of four points are right to 3e-4
             let load = rod.mass_per_length * self.gravity.norm()
                 + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
             let softest = rod.stiffness.min();
@@ -460,7 +461,8 @@ impl Parameters {
         Ok(Mesh::uniform(self.length, cells, stages, self.rest_curvature))
     }
 
-    /// The longest internal step: as given, or a part of the shortest time in which gravity or stiffness move the whole rod.
+    /// The longest internal step: as given, or a part of the shortest time in which gravity or stiffness move the whole
+    /// rod.
     fn longest_step(&self, rod: &Rod, tolerance: f64) -> f64 {
         if self.step > 0.0 {
             return self.step;
@@ -477,7 +479,8 @@ impl Parameters {
 const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
 const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
-/// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the motion.
+/// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
+/// motion.
 const MAX_CELL_TURN: f64 = 3.0;
 
 impl Inputs {

@@ -1,5 +1,5 @@
-//! Orders of convergence, fitted: in time 2 at every spectral radius below 1, in space 2s; tip position, tip velocity and the
-//! reaction at the base, each against its own refined solution.
+//! Orders of convergence, fitted: in time 2 at every spectral radius below 1, in space 2s; tip position, tip velocity
+//! and the reaction at the base, each against its own refined solution.
 
 mod common;
 
@@ -62,7 +62,8 @@ impl Scene {
                 }
             }
             Self::Spin => {
-                // the angle of a rate that rises from 3 to 5 rad/s in 0.6 s; the ramp's integral by Gauss quadrature of its polynomial
+                // the angle of a rate that rises from 3 to 5 rad/s in 0.6 s; the ramp's integral by Gauss quadrature of
+                // its polynomial
                 let duration = 0.6;
                 let x = (t / duration).min(1.0);
                 let integral = x.powi(6) * (21.0 - 60.0 * x + 67.5 * x * x - 35.0 * x.powi(3) + 7.0 * x.powi(4));
@@ -155,7 +156,8 @@ const QUANTITIES: [&str; 4] = ["tip position", "tip velocity", "base force", "ba
 #[test]
 fn order_2s_in_space() {
     for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
-        // fine enough for the layer (EI Δt²/ρA)^(1/4) = 4 cm that a step forms at the clamp, coarse enough to stay above rounding
+        // fine enough for the layer (EI Δt²/ρA)^(1/4) = 4 cm that a step forms at the clamp, coarse enough to stay
+        // above rounding
         let meshes: [&[usize]; 3] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20]];
         for (stages, cells) in (1..).zip(meshes) {
             let orders = orders_in_space(scene, stages, cells);

@@ -34,8 +34,8 @@ fn run(
     }
 }
 
-/// The inertia of a plane beam without rotary inertia. About its own axis a section must have some, or nothing tells how it
-/// starts to spin; plane motion does not feel how much.
+/// The inertia of a plane beam without rotary inertia. About its own axis a section must have some, or nothing tells
+/// how it starts to spin; plane motion does not feel how much.
 fn without_rotary_inertia() -> Vector3<f64> {
     Vector3::z()
 }
@@ -132,8 +132,8 @@ fn spin_up() {
     case.check("peak |u2|", &[peak.0, peak.1]);
 }
 
-/// The steady deflection of a cantilever on a base shaken by 1: w(s) = cosh ks + a (cos ks − cosh ks) + b (sin ks − sinh ks)
-/// with w'' = w''' = 0 at s = 1, and its slope.
+/// The steady deflection of a cantilever on a base shaken by 1: w(s) = cosh ks + a (cos ks − cosh ks) + b (sin ks −
+/// sinh ks) with w'' = w''' = 0 at s = 1, and its slope.
 fn steady_shape(k: f64, s: f64) -> (f64, f64) {
     let free_end = Matrix2::new(-k.cos() - k.cosh(), -k.sin() - k.sinh(), k.sin() - k.sinh(), -k.cos() - k.cosh());
     let [a, b]: [f64; 2] = (free_end.try_inverse().expect("no resonance") * Vector2::new(-k.cosh(), -k.sinh())).into();
@@ -144,8 +144,8 @@ fn steady_shape(k: f64, s: f64) -> (f64, f64) {
 
 #[test]
 fn shaken_base_in_its_steady_state() {
-    // without damping all points move in phase, w(s) sin ωt: the run starts straight with the velocities of that motion, and
-    // shows the amplitudes a quarter of a period later
+    // without damping all points move in phase, w(s) sin ωt: the run starts straight with the velocities of that
+    // motion, and shows the amplitudes a quarter of a period later
     let case = Case::read("c5_base_excitation_tf");
     let (mut tip, mut moment, mut shear) = (vec![], vec![], vec![]);
     for omega in case.inputs("omega") {

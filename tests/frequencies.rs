@@ -1,4 +1,5 @@
-//! Natural frequencies, and the forced vibration of the linearised rod, against closed forms and converged eigenproblems.
+//! Natural frequencies, and the forced vibration of the linearised rod, against closed forms and converged
+//! eigenproblems.
 //!
 //! Meshes are the coarsest round numbers whose error stays below a tenth of the tolerance.
 
@@ -63,7 +64,8 @@ fn cantilever_in_bending_and_in_torsion() {
     let case = Case::read("c5_cantilever_eb");
     let mesh = Mesh::uniform(case.input("L"), 6, 4, Vector3::zeros());
     let boundary = clamped(along_x());
-    // bending and torsion of a straight rod do not couple; the one not looked at is made too stiff to show among the first
+    // bending and torsion of a straight rod do not couple; the one not looked at is made too stiff to show among the
+    // first
     let stiffer = 1e8;
     let rod = Rod {
         mass_per_length: case.input("rhoA"),
@@ -112,8 +114,9 @@ fn cantilever_hanging_and_standing() {
 fn hanging_chain() {
     let case = Case::read("c5_hanging_chain");
     let (length, gravity) = (case.input("L"), case.input("g"));
-    // what stiffness is left raises ω: the clamp shortens the chain by the layer √(EI/ρAgL) = 1e-4 L in which it bends, half of
-    // which is relative, and the fifth mode bends by itself as much again; together a twentieth of the tolerance
+    // what stiffness is left raises ω: the clamp shortens the chain by the layer √(EI/ρAgL) = 1e-4 L in which it bends,
+    // half of which is relative, and the fifth mode bends by itself as much again; together a twentieth of the
+    // tolerance
     let stiffness = 1e-8 * case.input("rhoA") * gravity * length.powi(3);
     let rod = Rod { mass_per_length: case.input("rhoA"), ..kirchhoff(stiffness, stiffness) };
     let boundary = Boundary { gravity: Vector3::x() * gravity, ..clamped(along_x()) };

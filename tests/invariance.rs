@@ -114,8 +114,8 @@ fn a_turned_and_shifted_scene_has_a_turned_and_shifted_answer() {
     }
 }
 
-/// The rod is of size one, and its forces and moments are below it. Newton ends with an increment below 1e-8 and an error of
-/// the order of its square; how many iterations that takes may depend on the frame.
+/// The rod is of size one, and its forces and moments are below it. Newton ends with an increment below 1e-8 and an
+/// error of the order of its square; how many iterations that takes may depend on the frame.
 fn compare(by: &Matrix3<f64>, shifted: &Vector3<f64>, a: &State, b: &State, tolerance: f64) {
     for (a, b) in a.nodes.iter().zip(&b.nodes) {
         assert!((by * a.position + shifted - b.position).norm() < tolerance);
@@ -191,8 +191,8 @@ fn plane_motion_stays_plane() {
 
 #[test]
 fn the_energy_balance_closes_at_second_order() {
-    // from the equilibrium under gravity and a load on the tip, on a base that turns and shifts; Kelvin-Voigt damping, drag and
-    // the body on the tip take part; the next order in Δt is what the tolerance of the slope allows for
+    // from the equilibrium under gravity and a load on the tip, on a base that turns and shifts; Kelvin-Voigt damping,
+    // drag and the body on the tip take part; the next order in Δt is what the tolerance of the slope allows for
     let moved = |t: f64| {
         let duration = 0.3;
         let [x, v, a] = ramp(t / duration);

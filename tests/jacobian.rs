@@ -1,5 +1,5 @@
-//! Every block and residual of `pose::assemble` against an independent one: the equations of a rod, written slowly with dual
-//! numbers, differentiated one unknown at a time.
+//! Every block and residual of `pose::assemble` against an independent one: the equations of a rod, written slowly with
+//! dual numbers, differentiated one unknown at a time.
 #![allow(non_snake_case, missing_docs)]
 
 #[path = "common/full.rs"]
@@ -383,8 +383,8 @@ struct Switches {
     loaded: bool,
 }
 
-/// A rod of two unequal cells anywhere in configuration space: nothing fits, all residuals and strains are large. The angles
-/// between node and point and between old and new stay in (0.2, 2.4), where the slow formulas lose no digits.
+/// A rod of two unequal cells anywhere in configuration space: nothing fits, all residuals and strains are large. The
+/// angles between node and point and between old and new stay in (0.2, 2.4), where the slow formulas lose no digits.
 fn case(random: &mut Random, switches: &Switches) -> Case {
     let Switches { stages, time, damped, dragged, extensible, loaded } = *switches;
     let on = |switch: bool| if switch { 1.0 } else { 0.0 };
@@ -438,8 +438,8 @@ fn case(random: &mut Random, switches: &Switches) -> Case {
     Case { mesh, rod, old, state, boundary, time }
 }
 
-/// Blocks and residuals of one case; differences relative to the largest entry of the block, and of the row where the exact
-/// block is zero.
+/// Blocks and residuals of one case; differences relative to the largest entry of the block, and of the row where the
+/// exact block is zero.
 fn check(case: &Case, switches: &Switches) -> f64 {
     let Case { mesh, rod, old, state, boundary, time } = case;
     let mut system = System::new(mesh.cells.len(), &mesh.rule, rod.is_extensible());

@@ -53,8 +53,8 @@ impl With {
     }
 }
 
-/// The increments in the full steps of Newton from `time` to `time` + [`DT`]: of rotations in rad, of forces and moments
-/// relative to the largest in the rod.
+/// The increments in the full steps of Newton from `time` to `time` + [`DT`]: of rotations in rad, of forces and
+/// moments relative to the largest in the rod.
 fn increments(stepper: &Stepper, scene: Scene, time: f64, scheme: Scheme, row: Row) -> [f64; 7] {
     let Stepper { mesh, rod, state, .. } = stepper;
     let dt = DT;
@@ -79,7 +79,8 @@ fn increments(stepper: &Stepper, scene: Scene, time: f64, scheme: Scheme, row: R
     })
 }
 
-/// Steps one rod through one scene: the iterations of every step, and the largest dₖ₊₁/dₖ² and dₖ₊₁/dₖ of their increments.
+/// Steps one rod through one scene: the iterations of every step, and the largest dₖ₊₁/dₖ² and dₖ₊₁/dₖ of their
+/// increments.
 fn run(scene: Scene, with: With, row: Row, cells: usize, stages: usize) -> (Vec<usize>, f64, f64) {
     let mesh = Mesh::uniform(1.0, cells, stages, Vector3::zeros());
     let state = State::at_rest_shape(&mesh, &scene.boundary(0.0).base);

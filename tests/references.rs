@@ -1,5 +1,5 @@
-//! Three scenes against reference solutions of a strain-mode code: the scheme's own errors at fixed cells and steps, which the
-//! packaged unit is measured by.
+//! Three scenes against reference solutions of a strain-mode code: the scheme's own errors at fixed cells and steps,
+//! which the packaged unit is measured by.
 
 mod common;
 

@@ -40,7 +40,8 @@ fn empty(mesh: &Mesh, rod: &Rod) -> System {
     System::new(mesh.cells.len(), &mesh.rule, rod.is_extensible())
 }
 
-/// One quantity of every kind: the unknowns and the equations for Φ, w, n, m and the law stand at these places of a block.
+/// One quantity of every kind: the unknowns and the equations for Φ, w, n, m and the law stand at these places of a
+/// block.
 const KINDS: usize = 5;
 
 /// The kinds of the unknowns, block by block.
@@ -103,8 +104,8 @@ struct Outcome {
     lu_error: f64,
 }
 
-/// The reference is the LU of the equilibrated matrix, refined with residuals of twice the precision: the LU alone, by its
-/// partial pivoting, loses up to seven digits more than the sweep where inertia dwarfs the stiffness.
+/// The reference is the LU of the equilibrated matrix, refined with residuals of twice the precision: the LU alone, by
+/// its partial pivoting, loses up to seven digits more than the sweep where inertia dwarfs the stiffness.
 fn compare(mesh: &Mesh, system: &System, sweep: &mut Sweep) -> Outcome {
     sweep.solve(system).unwrap();
     let full = Full::new(system, &mesh.rule);
@@ -162,10 +163,11 @@ fn check(name: &str, rod: &Rod, mesh: &Mesh, dt: Option<f64>, row: Row) -> Outco
     let mut sweep = Sweep::new(mesh.cells.len(), &mesh.rule, rod.is_extensible());
     let outcome = compare(mesh, &system, &mut sweep);
 
-    // The inertia of a cell over its bending stiffness. A cell much longer than the bending wave of a step, 1 ≪ (h/λ)⁴, moves
-    // as it is pushed whatever its stiffness, and its moments at the nodes are differences of larger ones: roundings are lost, in
-    // the LU as well. Measured: a hundredth of that many in the residual, a twentieth in the solution, all at 1e-5 s on 30
-    // cells and fewer. The sweep's next solve, which is Newton's next iteration, makes them good.
+    // The inertia of a cell over its bending stiffness. A cell much longer than the bending wave of a step, 1 ≪ (h/λ)⁴,
+    // moves as it is pushed whatever its stiffness, and its moments at the nodes are differences of larger ones:
+    // roundings are lost, in the LU as well. Measured: a hundredth of that many in the residual, a twentieth in the
+    // solution, all at 1e-5 s on 30 cells and fewer. The sweep's next solve, which is Newton's next iteration, makes
+    // them good.
     let h = mesh.length() / mesh.cells.len() as f64;
     let inertia = dt.map_or(0.0, |dt| rod.mass_per_length * scheme.rate_weight(dt).powi(2));
     let lost = f64::EPSILON * inertia * h.powi(4) / rod.stiffness.x;

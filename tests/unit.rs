@@ -133,7 +133,8 @@ fn every_base_motion_follows_what_it_is_given() {
         for (i, outputs) in steps.iter().enumerate() {
             let (x, v) = motion((i + 1) as f64 * h);
             let speed = 0.02 * TAU / period;
-            // 2 % of the amplitude from extrapolating over a hundredth of a period; the derived twist adds its tracker's delay
+            // 2 % of the amplitude from extrapolating over a hundredth of a period; the derived twist adds its
+            // tracker's delay
             let (part, rate) = if base_motion == 1 { (0.03, 0.08) } else { (0.02, 0.05) };
             assert!(
                 (outputs.stations[0].y - x).abs() < part * 0.02,

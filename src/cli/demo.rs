@@ -1,7 +1,8 @@
-//! `cosserat demo`: packages the unit, loads it back out of its archive and drives it through the C interface, as a master
-//! does that knows nothing but the model description.
+//! `cosserat demo`: packages the unit, loads it back out of its archive and drives it through the C interface, as a
+//! master does that knows nothing but the model description.
 //!
-//! The rod hangs from a clamp that holds it level. The clamp begins to shake sideways; later a pulse of force hits the tip.
+//! The rod hangs from a clamp that holds it level. The clamp begins to shake sideways; later a pulse of force hits the
+//! tip.
 
 use super::Progress;
 use super::picture::{self, Frame};

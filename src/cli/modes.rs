@@ -12,7 +12,8 @@ pub struct Arguments {
     /// How many frequencies, from the lowest.
     #[arg(short, long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..))]
     count: u8,
-    /// Sets a parameter, or an input the equilibrium is under; arrays by element (gravity[3]=0) or as a whole (gravity=0,0,0).
+    /// Sets a parameter, or an input the equilibrium is under; arrays by element (gravity[3]=0) or as a whole
+    /// (gravity=0,0,0).
     #[arg(short, long, value_name = "NAME=VALUE")]
     set: Vec<String>,
 }

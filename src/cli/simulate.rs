@@ -1,7 +1,7 @@
 //! `cosserat simulate`: inputs from a CSV, outputs to a CSV, for those without an importer.
 //!
-//! The communication points are the rows of the input table, or equal steps if `--step` says so; between rows an input is
-//! interpolated, and it is held over the step that begins there. The numbers are those of the FMU, bit for bit,
+//! The communication points are the rows of the input table, or equal steps if `--step` says so; between rows an input
+//! is interpolated, and it is held over the step that begins there. The numbers are those of the FMU, bit for bit,
 //! where the host steps from each of these times to the next.
 
 use super::{Error as ValueError, Progress};
@@ -22,7 +22,8 @@ pub struct Arguments {
     /// Where to write the outputs as CSV; without it, to standard output.
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Sets a parameter, or the start value of an input; arrays by element (gravity[3]=0) or as a whole (gravity=0,0,0).
+    /// Sets a parameter, or the start value of an input; arrays by element (gravity[3]=0) or as a whole
+    /// (gravity=0,0,0).
     #[arg(short, long, value_name = "NAME=VALUE")]
     set: Vec<String>,
     /// An output to write, an array if named without index; may be repeated. Without it, all are written.

@@ -339,7 +339,8 @@ impl Scalar for i32 {
 }
 
 /// Times closer than this part of a step, or of the time itself, are the same to a host that adds up its steps; the
-/// rounding of a million additions stays below the second, and a step that is too early or too late stands out from both.
+/// rounding of a million additions stays below the second, and a step that is too early or too late stands out from
+/// both.
 const SAME_TIME: [f64; 2] = [1e-6, 1e-12];
 
 /// Name of an instance that panics in its first step, in builds with debug assertions only: the guard has to be seen at

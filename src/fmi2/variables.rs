@@ -45,7 +45,8 @@ pub enum Slot {
 /// Later than that no output depends on the *present* value of any input: an input acts in the `fmi2DoStep` that
 /// follows, and a get between a set and that step still answers with the state at the end of the last step. So the
 /// outputs of the model structure have no dependencies at all, and a master that closes a loop through the unit finds
-/// no algebraic loop at a communication point. This would change with inputs that feed through, such as an acceleration.
+/// no algebraic loop at a communication point. This would change with inputs that feed through, such as an
+/// acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Initially {
     /// On none: always the same value.

@@ -1,8 +1,8 @@
 //! The linear system of `sweep::System` written out: every unknown and every equation, in blocks of 3 × 3.
 //!
-//! Blocks of unknowns, along the rod: φ, w, n, m of a node, then φ, w, n, m, g of every Gauss point of the cell behind it.
-//! Blocks of equations: the two of the base, then cell by cell those for n₀, m₀, for Φ, w, n, m and the law at every
-//! point, for Φ₁, w₁, and at the end the two of the tip. Φ is expressed by the rotations: Φ_k = T_k⁻¹ (φ_k − φ₀).
+//! Blocks of unknowns, along the rod: φ, w, n, m of a node, then φ, w, n, m, g of every Gauss point of the cell behind
+//! it. Blocks of equations: the two of the base, then cell by cell those for n₀, m₀, for Φ, w, n, m and the law at
+//! every point, for Φ₁, w₁, and at the end the two of the tip. Φ is expressed by the rotations: Φ_k = T_k⁻¹ (φ_k − φ₀).
 
 use cosserat_rod::mesh::{Gauss, MAX_STAGES};
 use cosserat_rod::sweep::{Relation, System};

@@ -52,8 +52,8 @@ impl Case {
         self.compare(name, &[computed], &[expected], |_| expected.abs());
     }
 
-    /// As [`Self::check`] for vectors, a relative tolerance being relative to the length of the vector: its direction is no
-    /// worse known than its length, and a component may vanish.
+    /// As [`Self::check`] for vectors, a relative tolerance being relative to the length of the vector: its direction
+    /// is no worse known than its length, and a component may vanish.
     pub fn check_vectors(&self, name: &str, computed: &[Vector3<f64>]) {
         let expected = self.expected(name);
         let components: Vec<f64> = computed.iter().flat_map(|v| v.iter().copied()).collect();

@@ -1,5 +1,5 @@
-//! Three scenes: a rubber rod released from the horizontal (S1), a steel wire on a shaken base (S2), a hanging rubber rod
-//! under a spatial pulse at its tip (S3). All are 1 m long.
+//! Three scenes: a rubber rod released from the horizontal (S1), a steel wire on a shaken base (S2), a hanging rubber
+//! rod under a spatial pulse at its tip (S3). All are 1 m long.
 
 use cosserat_rod::pose::{Base, Boundary};
 use cosserat_rod::rod::Rod;
