@@ -307,7 +307,7 @@ impl Sweep {
         self.relations[cells] = system.tip;
         for cell in (0..cells).rev() {
             let ends = &system.cells[cell];
-            let points: &[Point; S] = system.points[cell * S..][..S].try_into().unwrap_or_else(|_| unreachable!());
+            let points = &system.points[cell * S..][..S];
             let h = ends.length;
 
             // A φ + M Φ = A φ₀ + (A T + M) (h Σ weights_l g_l − e), by A and A T + M
