@@ -255,6 +255,11 @@ impl State {
         &self.nodes[self.nodes.len() - 1]
     }
 
+    /// The section that the history `i` belongs to.
+    fn remembering(&self, i: usize) -> &Section {
+        self.points.get(i).unwrap_or(self.tip())
+    }
+
     /// The history of the tip.
     pub fn tip_memory(&self) -> &Memory {
         &self.memory[self.memory.len() - 1]
@@ -374,15 +379,9 @@ impl State {
             }
         }
         let drag = rod.drag_rate();
-        let tip = self.nodes.len() - 1;
-        for (i, memory) in self.memory.iter_mut().enumerate() {
-            let (section, old_section) = match self.points.get(i) {
-                Some(section) => (section, &old.points[i]),
-                None => (&self.nodes[tip], &old.nodes[tip]),
-            };
-            let past = &old.memory[i];
-            let theta = so3::log(&old_section.rotation.tr_mul(&section.rotation));
-            memory.spin = time.motion(&past.spin, &theta);
+        for i in 0..self.memory.len() {
+            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
+            self.memory[i].spin = time.motion(&old.memory[i].spin, &theta);
         }
         for (i, section) in self.points.iter().enumerate() {
             let cell = &mesh.cells[i / mesh.rule.stages];
@@ -401,17 +400,13 @@ impl State {
                 if *row == Row::Rotations {
                     self.rebuild_velocities(mesh);
                 }
-                for (i, memory) in self.memory.iter_mut().enumerate() {
-                    let (section, old_section) = match self.points.get(i) {
-                        Some(section) => (section, &old.points[i]),
-                        None => (&self.nodes[tip], &old.nodes[tip]),
-                    };
-                    let past = &old.memory[i].travel;
-                    let increment = section.position - old_section.position;
-                    memory.travel = match row {
+                for i in 0..self.memory.len() {
+                    let (section, past) = (self.remembering(i), &old.memory[i].travel);
+                    let increment = section.position - old.remembering(i).position;
+                    self.memory[i].travel = match row {
                         Row::Positions => scheme.motion(past, &increment, *dt),
                         Row::Rotations => {
-                            let u = memory.travel.velocity.value;
+                            let u = self.memory[i].travel.velocity.value;
                             scheme.followed(past, &increment, u, section.acceleration - u * drag, *dt)
                         }
                     };

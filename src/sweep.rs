@@ -465,11 +465,6 @@ impl Sweep {
             self.nodes[cell + 1] = Increment { w: w_1, phi: phi_1, n: n_1, m: m_1 };
         }
     }
-
-    /// The relation (n, m) = P (w, φ) + p at the base: of the reaction to a change of the base's motion.
-    pub fn base_relation(&self) -> &Relation {
-        &self.relations[0]
-    }
 }
 
 /// Solves rows · (u, x, 1) = 0 for u = gain (x, 1): Gaussian elimination with scaled partial pivoting.
