@@ -14,11 +14,12 @@ mod full;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::fmi2::host::Fmu;
 use cosserat_rod::fmi2::variables::Kind;
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::package;
-use cosserat_rod::pose::{Base, Boundary, Row, State, Time, assemble};
+use cosserat_rod::pose::{Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::sweep::{Sweep, System};
@@ -51,22 +52,17 @@ struct Iteration {
 impl Iteration {
     fn new(cells: usize, stages: usize) -> Self {
         let shape = Mesh::uniform(1.0, cells, stages, Vector3::new(1.0, 0.5, 0.2));
-        let base = Base {
+        let base = Support {
             angular_velocity: Vector3::new(1.0, 2.0, 3.0),
-            ..Base::at_rest(Vector3::zeros(), Matrix3::identity())
+            ..Support::at_rest(Vector3::zeros(), Matrix3::identity())
         };
-        let turned = Base { rotation: so3::exp(&(base.angular_velocity * DT)), ..base };
+        let turned = Support { rotation: so3::exp(&(base.angular_velocity * DT)), ..base };
         let mesh = Mesh::uniform(1.0, cells, stages, Vector3::zeros());
         let system = System::new(cells, &mesh.rule, false);
         Self {
             sweep: Sweep::new(cells, &mesh.rule, false),
             rod: Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0),
-            boundary: Boundary {
-                base: turned,
-                tip_force: Vector3::zeros(),
-                tip_moment: Vector3::zeros(),
-                gravity: Vector3::new(0.0, 0.0, -9.81),
-            },
+            boundary: Boundary::hanging_from(turned, Vector3::new(0.0, 0.0, -9.81)),
             time: Time::Step { scheme: Scheme::from_spectral_radius(0.5), dt: DT, row: Row::Rotations },
             old: State::at_rest_shape(&shape, &base),
             trial: State::at_rest_shape(&shape, &turned),

@@ -1,7 +1,8 @@
 //! Energies of a state, and the works and losses of a step; all by the Gauss rule of the cells.
 
+use crate::boundary::Boundary;
 use crate::mesh::Mesh;
-use crate::pose::{Boundary, State};
+use crate::pose::State;
 use crate::rod::Rod;
 use crate::so3;
 use nalgebra::Vector3;

@@ -10,7 +10,7 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> unit -> {path, modes, stepper} -> {alpha, sweep, pose -> rod -> mesh -> so3}
+//! host =C=> fmi2 -> unit -> {path, modes, stepper} -> {alpha, sweep, pose -> boundary, rod -> mesh -> so3}
 //! ```
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
@@ -47,9 +47,11 @@ pub mod mesh;
 pub mod rod;
 pub mod sweep;
 pub mod alpha;
+pub mod boundary;
 pub mod pose;
 pub mod energy;
 pub mod stepper;
+pub mod formulation;
 pub mod modes;
 pub mod path;
 pub mod unit;

@@ -8,7 +8,8 @@
 // R is the paper's letter
 #![allow(non_snake_case)]
 
-use crate::pose::{self, Boundary};
+use crate::boundary::Boundary;
+use crate::pose;
 use crate::stepper::{Diverged, Stepper};
 use crate::sweep::Increment;
 use nalgebra::{DMatrix, Vector3};

@@ -12,7 +12,7 @@
 //! few digits do not shake the acceleration, and a path that missed something returns. Rotations do the same through
 //! exp, in world axes.
 
-use crate::pose::Base;
+use crate::boundary::Support;
 use crate::so3;
 use nalgebra::{Matrix3, Vector3};
 
@@ -74,7 +74,7 @@ impl Twist {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Path {
     given: Given,
-    base: Base,
+    base: Support,
     /// The last sample, or the tracker's estimate of it, with its rate.
     last: Sample,
     rate: Twist,
@@ -88,7 +88,7 @@ pub struct Path {
 /// The path within one communication step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    start: Base,
+    start: Support,
     /// At the start of the step.
     acceleration: Twist,
     /// The path as it will be at the end.
@@ -112,16 +112,16 @@ impl Path {
         if given == Given::Pose {
             (last.velocity, last.angular_velocity) = (Vec3::zeros(), Vec3::zeros());
         }
-        let base = Base {
+        let base = Support {
             velocity: last.velocity,
             angular_velocity: last.angular_velocity,
-            ..Base::at_rest(sample.position, sample.rotation)
+            ..Support::at_rest(sample.position, sample.rotation)
         };
         Self { given, base, last, rate: Twist::default(), jerk: Twist::default(), last_step: 0.0, samples: 0 }
     }
 
     /// The base at the last communication point.
-    pub fn base(&self) -> &Base {
+    pub fn base(&self) -> &Support {
         &self.base
     }
 
@@ -193,19 +193,20 @@ impl Path {
 
 impl Segment {
     /// The base `time` s after the start of the step.
-    pub fn at(&self, time: f64) -> Base {
-        let Base { position, rotation, velocity, angular_velocity, .. } = self.start;
+    pub fn at(&self, time: f64) -> Support {
+        let Support { position, rotation, velocity, angular_velocity, .. } = self.start;
         let now = Twist { linear: velocity, angular: angular_velocity };
         let (start, slope, square) = (self.acceleration, self.next.jerk, time * time);
         let moved = now.map(|v| v * time).plus(0.5 * square, start).plus(square * time / 6.0, slope);
         let twist = now.plus(time, start).plus(0.5 * square, slope);
-        Base {
+        Support {
             position: position + moved.linear,
             rotation: so3::orthonormalised(&(so3::exp(&moved.angular) * rotation)),
             velocity: twist.linear,
             // the left Jacobian is the right one of −Φ
             angular_velocity: so3::right_jacobian(&-moved.angular) * twist.angular,
             acceleration: start.plus(time, slope).linear,
+            ..self.start
         }
     }
 

@@ -20,6 +20,7 @@
 #![allow(non_snake_case)]
 
 use crate::alpha::{Motion, Rate, Scheme};
+use crate::boundary::{Boundary, Support};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::rod::Rod;
 use crate::so3;
@@ -67,42 +68,6 @@ pub struct Memory {
     pub strain: Motion,
 }
 
-/// Motion of the base at one instant, world frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Base {
-    /// r(0), m.
-    pub position: Vec3,
-    /// R(0).
-    pub rotation: Mat3,
-    /// u(0), m/s.
-    pub velocity: Vec3,
-    /// Angular velocity, rad/s.
-    pub angular_velocity: Vec3,
-    /// a(0), m/s².
-    pub acceleration: Vec3,
-}
-
-impl Base {
-    /// A base at rest.
-    pub fn at_rest(position: Vec3, rotation: Mat3) -> Self {
-        let zero = Vec3::zeros();
-        Self { position, rotation, velocity: zero, angular_velocity: zero, acceleration: zero }
-    }
-}
-
-/// What acts on the rod at one instant, world frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Boundary {
-    /// Motion of the base.
-    pub base: Base,
-    /// Dead force on the tip, N.
-    pub tip_force: Vec3,
-    /// Dead moment on the tip, N·m.
-    pub tip_moment: Vec3,
-    /// g, m/s².
-    pub gravity: Vec3,
-}
-
 /// A rod at one instant, with its history.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
@@ -113,7 +78,7 @@ pub struct State {
     /// Histories of the Gauss points, then of the tip.
     pub memory: Vec<Memory>,
     /// Motion of the base.
-    pub base: Base,
+    pub base: Support,
     /// Length of the step that led here, s; 0 at a start.
     pub dt: f64,
     /// Scheme of that step.
@@ -188,7 +153,7 @@ impl Time {
 
 impl State {
     /// The unstressed rod on a base, moving with it as one rigid body.
-    pub fn at_rest_shape(mesh: &Mesh, base: &Base) -> Self {
+    pub fn at_rest_shape(mesh: &Mesh, base: &Support) -> Self {
         let stages = mesh.rule.stages;
         let mut state = Self {
             nodes: vec![Section::default(); mesh.cells.len() + 1],
@@ -220,7 +185,7 @@ impl State {
 
     /// Sets the velocities of all sections to those of a rigid body that moves with the base; accelerations to zero.
     pub fn move_rigidly(&mut self) {
-        let Base { position: r_0, velocity: u_0, angular_velocity: w, .. } = self.base;
+        let Support { position: r_0, velocity: u_0, angular_velocity: w, .. } = self.base;
         let tip = self.nodes[self.nodes.len() - 1];
         for (memory, section) in self.memory.iter_mut().zip(self.points.iter().chain(std::iter::once(&tip))) {
             let zero = Vec3::zeros();
@@ -619,7 +584,7 @@ pub fn assemble(
     }
 
     // the base is where its path says
-    let Base { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
+    let Support { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
     let target = match row {
         Row::Rotations => a + u * drag,
         Row::Positions => r,

@@ -4,8 +4,9 @@
 //! A step never changes the state it starts from; the new one is in [`Stepper::state`] after success only.
 
 use crate::alpha::{Motion, Scheme};
+use crate::boundary::Boundary;
 use crate::mesh::Mesh;
-use crate::pose::{self, Boundary, Row, State, Time};
+use crate::pose::{self, Row, State, Time};
 use crate::rod::Rod;
 use crate::sweep::{Increment, Scales, Singular, Sweep, System};
 use nalgebra::Vector3;

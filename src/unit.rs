@@ -4,11 +4,12 @@
 //! its halves again if need be; if that does not help either, the unit is as it was before the communication step.
 
 use crate::alpha::Scheme;
+use crate::boundary::Boundary;
 use crate::energy::Energy;
 use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
-use crate::pose::{Boundary, State};
+use crate::pose::State;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
@@ -552,10 +553,9 @@ impl Unit {
             inputs.sample(),
         );
         let boundary = Boundary {
-            base: *path.base(),
             tip_force: inputs.tip_force,
             tip_moment: inputs.tip_moment,
-            gravity: parameters.gravity,
+            ..Boundary::hanging_from(*path.base(), parameters.gravity)
         };
 
         let state = State::at_rest_shape(&mesh, &boundary.base);
@@ -637,10 +637,9 @@ impl Unit {
         halvings: u32,
     ) -> Result<(), Error> {
         let boundary = Boundary {
-            base: segment.at(time + dt),
             tip_force: inputs.tip_force,
             tip_moment: inputs.tip_moment,
-            gravity: self.gravity,
+            ..Boundary::hanging_from(segment.at(time + dt), self.gravity)
         };
         match self.stepper.advance(&boundary, self.scheme, dt) {
             Ok(report) => {
@@ -698,12 +697,7 @@ impl Unit {
     /// # Errors
     /// [`Error::NoEquilibrium`] if its stiffness is singular.
     pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
-        let boundary = Boundary {
-            base: *self.path.base(),
-            tip_force: Vector3::zeros(),
-            tip_moment: Vector3::zeros(),
-            gravity: self.gravity,
-        };
+        let boundary = Boundary::hanging_from(*self.path.base(), self.gravity);
         modes::modes(&mut self.stepper, &boundary, count).map_err(Error::NoEquilibrium)
     }
 

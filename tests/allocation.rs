@@ -4,8 +4,9 @@
 #![allow(unsafe_code)]
 
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Row, State};
+use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
@@ -56,10 +57,9 @@ fn a_step_allocates_nothing() {
     let damped = Rod { damping: Vector3::new(0.01, 0.01, 0.01), ..loaded.clone() };
     let extensible = Rod { compliance: Vector3::new(1e-2, 1e-2, 3e-3), ..damped.clone() };
     let boundary = Boundary {
-        base: Base::at_rest(Vector3::zeros(), Matrix3::identity()),
         tip_force: Vector3::new(0.1, 0.0, 0.0),
         tip_moment: Vector3::new(0.0, 0.0, 1e-3),
-        gravity: Vector3::new(9.81, 0.0, 0.0),
+        ..Boundary::hanging_from(Support::at_rest(Vector3::zeros(), Matrix3::identity()), Vector3::new(9.81, 0.0, 0.0))
     };
     for stages in 1..=4 {
         for (rod, row) in [

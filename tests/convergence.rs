@@ -5,8 +5,9 @@ mod common;
 
 use common::ramp;
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Row, State};
+use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
@@ -24,7 +25,7 @@ fn hanging() -> Matrix3<f64> {
 
 fn at_rest(rotation: Matrix3<f64>, gravity: f64) -> Boundary {
     let zero = Vec3::zeros();
-    Boundary { base: Base::at_rest(zero, rotation), tip_force: zero, tip_moment: zero, gravity: Vec3::z() * -gravity }
+    Boundary::hanging_from(Support::at_rest(zero, rotation), Vec3::z() * -gravity)
 }
 
 /// A smooth scene of a soft rod of 1 m.

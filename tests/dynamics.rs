@@ -6,8 +6,9 @@ mod common;
 
 use common::{Case, along_x, angle, clamped, kirchhoff, unstressed};
 use cosserat_rod::alpha::{Motion, Scheme};
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Row};
+use cosserat_rod::pose::Row;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
@@ -100,8 +101,8 @@ fn spin_up() {
     let rate = |t: f64| if t < t_s { omega_s * (t - (TAU * t / t_s).sin() * t_s / TAU) / t_s } else { omega_s };
     let boundary = |t: f64| {
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn(t)).into_inner() * along_x();
-        let base = Base::at_rest(Vector3::zeros(), rotation);
-        Boundary { base: Base { angular_velocity: Vector3::z() * rate(t), ..base }, ..clamped(rotation) }
+        let base = Support::at_rest(Vector3::zeros(), rotation);
+        Boundary { base: Support { angular_velocity: Vector3::z() * rate(t), ..base }, ..clamped(rotation) }
     };
     let rod = Rod {
         mass_per_length: case.input("rhoA"),
@@ -156,10 +157,10 @@ fn shaken_base_in_its_steady_state() {
         let dt = PI / 2.0 / omega / steps as f64;
         let boundary = |t: f64| {
             let (sin, cos) = (omega * t).sin_cos();
-            let base = Base::at_rest(Vector3::y() * (amplitude * sin), along_x());
+            let base = Support::at_rest(Vector3::y() * (amplitude * sin), along_x());
             let velocity = Vector3::y() * (amplitude * omega * cos);
             let acceleration = -Vector3::y() * (amplitude * omega * omega * sin);
-            Boundary { base: Base { velocity, acceleration, ..base }, ..clamped(along_x()) }
+            Boundary { base: Support { velocity, acceleration, ..base }, ..clamped(along_x()) }
         };
         let mesh = Mesh::uniform(case.input("L"), 6, 4, Vector3::zeros());
         let rod = Rod {

@@ -6,9 +6,10 @@
 mod common;
 
 use common::{Case, along_x, clamped, kirchhoff, unstressed};
+use cosserat_rod::boundary::Boundary;
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::modes::modes;
-use cosserat_rod::pose::{self, Boundary};
+use cosserat_rod::pose;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{DMatrix, DVector, Vector3};

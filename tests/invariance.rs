@@ -4,9 +4,10 @@ mod common;
 
 use common::{along_x, clamped, fitted_order, ramp, unstressed};
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::energy::Energy;
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Row, State};
+use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -33,13 +34,15 @@ fn bent_and_twisted(cells: usize, stages: usize) -> Mesh {
 fn turned(by: &Matrix3<f64>, shifted: &Vector3<f64>, boundary: &Boundary) -> Boundary {
     let base = &boundary.base;
     Boundary {
-        base: Base {
+        base: Support {
             position: by * base.position + shifted,
             rotation: by * base.rotation,
             velocity: by * base.velocity,
             angular_velocity: by * base.angular_velocity,
             acceleration: by * base.acceleration,
+            ..*base
         },
+        tip: boundary.tip,
         tip_force: by * boundary.tip_force,
         tip_moment: by * boundary.tip_moment,
         gravity: by * boundary.gravity,
@@ -53,13 +56,15 @@ fn shaken(t: f64) -> Boundary {
     let (x, v, a) = (1.0 - phase.cos(), rate * phase.sin(), rate * rate * phase.cos());
     let (axis, way) = (Vector3::new(0.1, 0.2, -0.3), Vector3::new(0.05, -0.1, 0.05));
     Boundary {
-        base: Base {
+        base: Support {
             position: way * x,
             rotation: Rotation3::new(axis * x).into_inner() * along_x(),
             velocity: way * v,
             angular_velocity: axis * v,
             acceleration: way * a,
+            held: Held::CLAMPED,
         },
+        tip: Support::free(),
         tip_force: Vector3::new(0.05, 0.1, 0.1),
         tip_moment: Vector3::new(0.005, 0.0, 0.01),
         gravity: Vector3::new(0.0, 0.0, -9.81),
@@ -149,8 +154,8 @@ fn a_rod_in_uniform_motion_is_unstrained() {
     let rod = Rod { drag: 0.0, ..furnished() };
     let velocity = Vector3::new(3.0, -1.0, 2.0);
     let boundary = |t: f64| {
-        let base = Base::at_rest(velocity * t, along_x());
-        Boundary { base: Base { velocity, ..base }, ..clamped(along_x()) }
+        let base = Support::at_rest(velocity * t, along_x());
+        Boundary { base: Support { velocity, ..base }, ..clamped(along_x()) }
     };
     for row in [Row::Rotations, Row::Positions] {
         let (stepper, _) = run(&mesh, &rod, boundary, row, 1.0, 0.05);
@@ -172,7 +177,7 @@ fn plane_motion_stays_plane() {
     let boundary = |t: f64| {
         let swing = Rotation3::new(Vector3::y() * (0.5 * (1.0 - (PI * t).cos()))).into_inner();
         let turning = Vector3::y() * (0.5 * PI * (PI * t).sin());
-        let base = Base { angular_velocity: turning, ..Base::at_rest(Vector3::zeros(), swing * along_x()) };
+        let base = Support { angular_velocity: turning, ..Support::at_rest(Vector3::zeros(), swing * along_x()) };
         let plane = Boundary { base, ..shaken(0.0) };
         let tip_force = Vector3::new(0.1, 0.0, 0.1);
         turned(&by, &Vector3::zeros(), &Boundary { tip_force, tip_moment: Vector3::y() * 0.01, ..plane })
@@ -197,12 +202,13 @@ fn the_energy_balance_closes_at_second_order() {
         let duration = 0.3;
         let [x, v, a] = ramp(t / duration);
         let (axis, way) = (Vector3::new(0.1, 0.2, -0.3), Vector3::new(0.1, -0.2, 0.1));
-        let base = Base {
+        let base = Support {
             position: way * x,
             rotation: Rotation3::new(axis * x).into_inner() * along_x(),
             velocity: way * (v / duration),
             angular_velocity: axis * (v / duration),
             acceleration: way * (a / duration.powi(2)),
+            held: Held::CLAMPED,
         };
         Boundary { base, ..shaken(0.0) }
     };

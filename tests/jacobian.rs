@@ -6,8 +6,9 @@
 mod full;
 
 use cosserat_rod::alpha::{Motion, Rate, Scheme};
+use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::mesh::{Cell, Gauss, Mesh};
-use cosserat_rod::pose::{Base, Boundary, Memory, Row, Section, State, Time, assemble};
+use cosserat_rod::pose::{Memory, Row, Section, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::sweep::{Scales, System};
@@ -400,12 +401,13 @@ fn case(random: &mut Random, switches: &Switches) -> Case {
     };
     let cells = [0.4, 0.7].map(|length| Cell { length, kappa_rest: random.vector(2.0) });
     let mesh = Mesh { cells: cells.to_vec(), rule: Gauss::new(stages) };
-    let base = Base {
+    let base = Support {
         position: random.vector(1.0),
         rotation: random.rotation(0.0, 3.0),
         velocity: random.vector(1.0),
         angular_velocity: random.vector(1.0),
         acceleration: random.vector(5.0),
+        held: Held::CLAMPED,
     };
     let mut state = State::at_rest_shape(&mesh, &base);
     let mut old = state.clone();
@@ -429,8 +431,11 @@ fn case(random: &mut Random, switches: &Switches) -> Case {
             strain: random.motion(3.0),
         };
     }
-    let boundary =
-        Boundary { base, tip_force: random.vector(2.0), tip_moment: random.vector(2.0), gravity: random.vector(9.81) };
+    let boundary = Boundary {
+        tip_force: random.vector(2.0),
+        tip_moment: random.vector(2.0),
+        ..Boundary::hanging_from(base, random.vector(9.81))
+    };
     let time = match time {
         None => Time::Static,
         Some((row, radius, dt)) => Time::Step { scheme: Scheme::from_spectral_radius(radius), dt, row },

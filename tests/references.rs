@@ -5,8 +5,9 @@ mod common;
 
 use common::along_x;
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, State};
+use cosserat_rod::pose::State;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
@@ -47,12 +48,12 @@ fn shake(t: f64) -> [f64; 3] {
 fn boundary(scene: &str, t: f64) -> Boundary {
     let zero = Vec3::zeros();
     let hanging = Matrix3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
-    let base = Base::at_rest(zero, if scene == "S1" { along_x() } else { hanging });
-    let mut boundary = Boundary { base, tip_force: zero, tip_moment: zero, gravity: Vec3::z() * -9.81 };
+    let base = Support::at_rest(zero, if scene == "S1" { along_x() } else { hanging });
+    let mut boundary = Boundary::hanging_from(base, Vec3::z() * -9.81);
     match scene {
         "S2" => {
             let [x, v, a] = shake(t).map(|x| Vec3::x() * x);
-            boundary.base = Base { position: x, velocity: v, acceleration: a, ..base };
+            boundary.base = Support { position: x, velocity: v, acceleration: a, ..base };
         }
         "S3" => {
             boundary.tip_force = Vec3::new(0.5 * pulse(t, 0.0, 0.2), 0.3 * pulse(t, 0.1, 0.2), 0.0);

@@ -4,9 +4,10 @@ mod common;
 
 use common::along_x;
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::energy::Energy;
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, State};
+use cosserat_rod::pose::State;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
@@ -39,9 +40,9 @@ fn released_rods_survive_every_step_size_at_spectral_radius_zero() {
     for (name, rod, length) in [("hair", hair(), 0.25), ("rubber", rubber, 1.0), ("steel", steel, 1.0)] {
         for (cells, stages) in [(6, 1), (25, 1), (100, 1), (400, 1), (5, 4)] {
             for dt in STEPS {
-                let base = Base::at_rest(Vector3::zeros(), along_x());
+                let base = Support::at_rest(Vector3::zeros(), along_x());
                 let (tip_force, tip_moment) = (Vector3::zeros(), Vector3::zeros());
-                let boundary = Boundary { base, tip_force, tip_moment, gravity: Vector3::z() * -9.81 };
+                let boundary = Boundary { tip_force, tip_moment, ..Boundary::hanging_from(base, Vector3::z() * -9.81) };
                 let mesh = Mesh::uniform(length, cells, stages, Vector3::zeros());
                 let state = State::at_rest_shape(&mesh, &base);
                 let mut stepper = Stepper::new(mesh, rod.clone(), state);

@@ -5,9 +5,9 @@
 mod common;
 
 use common::{Case, along_x, clamped, kirchhoff, tip_angle, unstressed};
+use cosserat_rod::boundary::Boundary;
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::modes::modes;
-use cosserat_rod::pose::Boundary;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector2, Vector3};

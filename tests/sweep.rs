@@ -8,8 +8,9 @@ mod full;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Row, State, Time, assemble};
+use cosserat_rod::pose::{Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
@@ -28,12 +29,7 @@ fn rods() -> [(&'static str, f64, f64, Rod); 3] {
 
 fn horizontal() -> Boundary {
     let laid = so3::from_quaternion(&Vector4::new(0.5f64.sqrt(), 0.0, 0.5f64.sqrt(), 0.0));
-    Boundary {
-        base: Base::at_rest(Vector3::zeros(), laid),
-        tip_force: Vector3::zeros(),
-        tip_moment: Vector3::zeros(),
-        gravity: Vector3::new(0.0, 0.0, -9.81),
-    }
+    Boundary::hanging_from(Support::at_rest(Vector3::zeros(), laid), Vector3::new(0.0, 0.0, -9.81))
 }
 
 fn empty(mesh: &Mesh, rod: &Rod) -> System {

@@ -3,8 +3,9 @@
 // every test file takes the part it needs
 #![allow(dead_code)]
 
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Base, Boundary, Section, State};
+use cosserat_rod::pose::{Section, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
@@ -121,7 +122,7 @@ pub fn kirchhoff(bending: f64, twist: f64) -> Rod {
 /// A base at rest in the origin, no load, no gravity.
 pub fn clamped(rotation: Matrix3<f64>) -> Boundary {
     let zero = Vector3::zeros();
-    Boundary { base: Base::at_rest(zero, rotation), tip_force: zero, tip_moment: zero, gravity: zero }
+    Boundary::hanging_from(Support::at_rest(zero, rotation), zero)
 }
 
 /// The unstressed rod on the base of `boundary`.

@@ -1,7 +1,7 @@
 //! Three scenes: a rubber rod released from the horizontal (S1), a steel wire on a shaken base (S2), a hanging rubber
 //! rod under a spatial pulse at its tip (S3). All are 1 m long.
 
-use cosserat_rod::pose::{Base, Boundary};
+use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use nalgebra::{Matrix3, Vector3, Vector4};
@@ -32,12 +32,10 @@ impl Scene {
 
     /// Base and loads at a time.
     pub fn boundary(&self, time: f64) -> Boundary {
-        let mut boundary = Boundary {
-            base: Base::at_rest(Vector3::zeros(), self.orientation()),
-            tip_force: Vector3::zeros(),
-            tip_moment: Vector3::zeros(),
-            gravity: Vector3::new(0.0, 0.0, -9.81),
-        };
+        let mut boundary = Boundary::hanging_from(
+            Support::at_rest(Vector3::zeros(), self.orientation()),
+            Vector3::new(0.0, 0.0, -9.81),
+        );
         match self {
             Self::S1 => {}
             Self::S2 => {
