@@ -76,4 +76,10 @@ impl Boundary {
     pub fn hanging_from(base: Support, gravity: Vec3) -> Self {
         Self { base, tip: Support::free(), tip_force: Vec3::zeros(), tip_moment: Vec3::zeros(), gravity }
     }
+
+    /// Whether the positions say more than the rotations: where the base is not a clamp, or a translation of the tip is
+    /// held.
+    pub fn holds_positions(&self) -> bool {
+        self.base.held != Held::CLAMPED || self.tip.held.translation != Held::FREE.translation
+    }
 }

@@ -21,7 +21,7 @@ pub struct Energy {
     pub dissipated: f64,
     /// Work the base has done on the rod.
     pub work_base: f64,
-    /// Work the tip force and moment have done on the rod.
+    /// Work the tip force and moment, and the support of the tip, have done on the rod.
     pub work_tip: f64,
 }
 
@@ -59,8 +59,10 @@ impl Energy {
         let (base_old, base_new) = (&old.nodes[0], &new.nodes[0]);
         let base = -0.5 * (base_old.force + base_new.force).dot(&(base_new.position - base_old.position))
             - 0.5 * (base_old.moment + base_new.moment).dot(&turn(&base_old.rotation, &base_new.rotation));
-        let tip = boundary.tip_force.dot(&(new.tip().position - old.tip().position))
-            + boundary.tip_moment.dot(&turn(&old.tip().rotation, &new.tip().rotation));
+        let (way, turned) = (new.tip().position - old.tip().position, turn(&old.tip().rotation, &new.tip().rotation));
+        let ((force_old, moment_old), (force, moment)) = (old.tip_reaction(rod), new.tip_reaction(rod));
+        let tip = (boundary.tip_force + 0.5 * (force_old + force)).dot(&way)
+            + (boundary.tip_moment + 0.5 * (moment_old + moment)).dot(&turned);
         let lost = 0.5 * new.dt * (losses(mesh, rod, old) + losses(mesh, rod, new));
         Self {
             dissipated: self.dissipated + lost,

@@ -14,21 +14,38 @@
 //! The acceleration has two rows. [`Row::Rotations`] is the one above: the section rotations are then the only
 //! variables with a history and the rod is an ordinary differential equation. [`Row::Positions`] takes a from the
 //! history of r instead; it is the row of the extensible rod, and for the inextensible one the more forgiving of the
-//! two at steps that do not resolve the motion.
+//! two at steps that do not resolve the motion, and the only one that sees where a held tip or a hinged base is.
+//!
+//! An end with the support rₛ, Rₛ has the coordinates ξ = (Rₛᵀ(r − rₛ), Φ), Φ = log(RₛᵀR). Where ξ is held it vanishes,
+//! and the support adds to the loads (n, m) of the end
+//!
+//! ```text
+//! (Rₛ λ, Rₛ J_r⁻¹(Φ) λ')          δΦ = J_r⁻ᵀ(Φ) Rₛᵀ φ
+//! ```
+//!
+//! with λ, λ' zero in the free coordinates: (λ, λ') does the work of a force on ξ.
 
 // one-letter names are the paper's: R, I, J, W are matrices
 #![allow(non_snake_case)]
 
 use crate::alpha::{Motion, Rate, Scheme};
-use crate::boundary::{Boundary, Support};
+use crate::boundary::{Boundary, Held, Support};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::rod::Rod;
 use crate::so3;
-use crate::sweep::{CellEnds, Increment, Point, Relation, Sweep, System};
+use crate::sweep::{CellEnds, Increment, Joint, Point, Relation, Sweep, System};
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
 type Mat3 = Matrix3<f64>;
+
+/// Springs on a held tip over EI/L³ and EI/L. The column on them buckles at a force 79/k EI/L² below that of the held one,
+/// 39.5 EI/L² at most; the sweep loses the roundings of k times the way of the tip. Of 1e2 to 1e6, 1e3 is the most that
+/// keeps the sweep's residuals as small as with a free tip.
+const SPRINGS: f64 = 1e3;
+/// The same over |n|/L and |n| L, for rods that carry by their tension more than by their stiffness; 1e2 keep the
+/// residuals no longer.
+const SPRINGS_OF_FORCE: f64 = 1e1;
 
 /// The unknowns at a node or Gauss point, world frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,8 +94,8 @@ pub struct State {
     pub points: Vec<Section>,
     /// Histories of the Gauss points, then of the tip.
     pub memory: Vec<Memory>,
-    /// Motion of the base.
-    pub base: Support,
+    /// What held and loaded the rod then.
+    pub boundary: Boundary,
     /// Length of the step that led here, s; 0 at a start.
     pub dt: f64,
     /// Scheme of that step.
@@ -159,7 +176,7 @@ impl State {
             nodes: vec![Section::default(); mesh.cells.len() + 1],
             points: vec![Section::default(); mesh.points()],
             memory: vec![Memory::default(); mesh.points() + 1],
-            base: *base,
+            boundary: Boundary::hanging_from(*base, Vec3::zeros()),
             dt: 0.0,
             scheme: Scheme::BACKWARD_EULER,
             row: Row::Rotations,
@@ -185,7 +202,7 @@ impl State {
 
     /// Sets the velocities of all sections to those of a rigid body that moves with the base; accelerations to zero.
     pub fn move_rigidly(&mut self) {
-        let Support { position: r_0, velocity: u_0, angular_velocity: w, .. } = self.base;
+        let Support { position: r_0, velocity: u_0, angular_velocity: w, .. } = self.boundary.base;
         let tip = self.nodes[self.nodes.len() - 1];
         for (memory, section) in self.memory.iter_mut().zip(self.points.iter().chain(std::iter::once(&tip))) {
             let zero = Vec3::zeros();
@@ -239,16 +256,32 @@ impl State {
         })
     }
 
-    /// Integrates r_s along the rod from the base.
+    /// Force and moment of the tip's support on the rod, world frame; none without a support. The reaction of the base
+    /// is (n, m) of the first node.
+    pub fn tip_reaction(&self, rod: &Rod) -> (Vec3, Vec3) {
+        let (tip, memory, boundary) = (self.tip(), self.tip_memory(), &self.boundary);
+        if boundary.tip.held == Held::FREE {
+            return (Vec3::zeros(), Vec3::zeros());
+        }
+        let turning = tip.rotation * memory.spin.acceleration.value;
+        let body = (memory.travel.acceleration.value - boundary.gravity) * rod.tip_mass;
+        (tip.force + body - boundary.tip_force, tip.moment + turning * rod.tip_inertia - boundary.tip_moment)
+    }
+
+    /// Integrates r_s along the rod from the base, which is where it is in the directions that are not held.
     fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
-        self.nodes[0].position = self.base.position;
+        let Support { position, rotation: R_s, held, .. } = self.boundary.base;
+        let free = Mat3::from_diagonal(&Vec3::from_fn(|i, _| f64::from(!held.translation[i])));
+        let away = R_s.tr_mul(&(self.nodes[0].position - position));
+        self.nodes[0].position = position + R_s * (free * away);
         self.accumulate(mesh, |point, _| tangent(rod, point), |section| &mut section.position);
     }
 
     /// Integrates a_s along the rod from the base (the drag's ν u included).
     fn rebuild_accelerations(&mut self, mesh: &Mesh, rod: &Rod) {
         let drag = rod.drag_rate();
-        self.nodes[0].acceleration = self.base.acceleration + self.base.velocity * drag;
+        let Support { velocity, acceleration, .. } = self.boundary.base;
+        self.nodes[0].acceleration = acceleration + velocity * drag;
         self.accumulate(
             mesh,
             |point, memory| point.rotation * acceleration_slope(&memory.spin, drag),
@@ -282,7 +315,7 @@ impl State {
         self.nodes.copy_from_slice(&other.nodes);
         self.points.copy_from_slice(&other.points);
         self.memory.copy_from_slice(&other.memory);
-        self.base = other.base;
+        self.boundary = other.boundary;
         self.dt = other.dt;
         self.scheme = other.scheme;
         self.row = other.row;
@@ -310,7 +343,7 @@ impl State {
             section.force = solved.n;
             section.moment = solved.m;
         }
-        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, nodes, points));
+        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, &self.boundary.tip.held, nodes, points));
         for (memory, (section, solved)) in self.memory.iter_mut().zip(self.points.iter().zip(points).chain([tip])) {
             let (spin, travel) = (&memory.spin.velocity.value, &memory.travel.velocity.value);
             let zero = Vec3::zeros();
@@ -322,7 +355,7 @@ impl State {
     /// Takes the solution of [`assemble_jerks`] as ω_tt and a_t.
     pub fn take_jerks(&mut self, rod: &Rod, nodes: &[Increment], points: &[Increment]) {
         let drag = rod.drag_rate();
-        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, nodes, points));
+        let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, &self.boundary.tip.held, nodes, points));
         for (memory, (section, solved)) in self.memory.iter_mut().zip(self.points.iter().zip(points).chain([tip])) {
             memory.spin.jerk = section.rotation.tr_mul(&solved.phi);
             memory.travel.jerk = solved.w - memory.travel.acceleration.value * drag;
@@ -331,7 +364,7 @@ impl State {
 
     /// Makes a converged iterate a state: memories, and what the row in use did not need.
     pub fn settle(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
-        self.base = boundary.base;
+        self.boundary = *boundary;
         for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
             section.rotation = so3::orthonormalised(&section.rotation);
         }
@@ -383,7 +416,7 @@ impl State {
     /// Integrates u_s = R (ω × e₃) along the rod from the base.
     fn rebuild_velocities(&mut self, mesh: &Mesh) {
         let Gauss { stages, a, b, .. } = &mesh.rule;
-        let mut start = self.base.velocity;
+        let mut start = self.boundary.base.velocity;
         for (j, cell) in mesh.cells.iter().enumerate() {
             let first = j * stages;
             let mut slopes = [Vec3::zeros(); MAX_STAGES];
@@ -403,10 +436,10 @@ impl State {
 }
 
 /// The solution of a start at the tip. The section there follows its neighbour unless a body makes it a variable of its
-/// own: its extrapolation along the cells would amplify whatever is not smooth at a start.
-fn end_of(rod: &Rod, nodes: &[Increment], points: &[Increment]) -> Increment {
+/// own, or a support holds it: its extrapolation along the cells would amplify whatever is not smooth at a start.
+fn end_of(rod: &Rod, held: &Held, nodes: &[Increment], points: &[Increment]) -> Increment {
     let (tip, last) = (nodes[nodes.len() - 1], points[points.len() - 1]);
-    if rod.tip_inertia > 0.0 { tip } else { Increment { phi: last.phi, ..tip } }
+    if rod.tip_inertia > 0.0 || held.rotation != Held::FREE.rotation { tip } else { Increment { phi: last.phi, ..tip } }
 }
 
 #[inline]
@@ -583,13 +616,20 @@ pub fn assemble(
         ends.e_m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
     }
 
-    // the base is where its path says
-    let Support { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
-    let target = match row {
-        Row::Rotations => a + u * drag,
-        Row::Positions => r,
-    };
-    system.base = (target - accumulated(&state.nodes[0]), so3::log(&(R * state.nodes[0].rotation.transpose())));
+    // the base is where its path says, or free of load
+    let base = &state.nodes[0];
+    (system.base, system.base_joint, system.base_load) = Default::default();
+    if boundary.base.held == Held::CLAMPED {
+        let Support { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
+        let target = match row {
+            Row::Rotations => a + u * drag,
+            Row::Positions => r,
+        };
+        system.base = (target - accumulated(base), so3::log(&(R * base.rotation.transpose())));
+    } else {
+        system.base_load = Relation { n: -base.force, m: -base.moment, ..Relation::default() };
+        system.base_joint = Some(attach(&boundary.base, base, &mut system.base_load));
+    }
 
     // the tip carries its loads and the body on it
     let tip = state.tip();
@@ -616,6 +656,53 @@ pub fn assemble(
         system.tip.m -= turning * rod.tip_inertia;
         system.tip.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
     }
+    system.tip_joint = None;
+    if boundary.tip.held != Held::FREE {
+        let joint = attach(&boundary.tip, tip, &mut system.tip);
+        system.tip_joint = Some(Joint { springs: springs(mesh, rod, state), ..joint });
+    }
+}
+
+/// ξ of an end as coordinates of its increments.
+fn coordinates(support: &Support, section: &Section) -> (Joint, Vec3) {
+    let R_s = &support.rotation;
+    let phi = so3::log(&R_s.tr_mul(&section.rotation));
+    let [a, b, c] = support.held.translation;
+    let [d, e, f] = support.held.rotation;
+    let joint = Joint {
+        held: [a, b, c, d, e, f],
+        by_w: R_s.transpose(),
+        by_phi: so3::inverse_right_jacobian(&phi).tr_mul(&R_s.transpose()),
+        of_moment: so3::right_jacobian(&phi) * R_s.transpose(),
+        correction: Default::default(),
+        springs: (0.0, 0.0),
+    };
+    (joint, phi)
+}
+
+/// The joint of an end with its support at an iterate. `load` is what the loads and the inertia of the end exceed its
+/// n and m by; the support takes from it what it carries.
+fn attach(support: &Support, section: &Section, load: &mut Relation) -> Joint {
+    let (mut joint, phi) = coordinates(support, section);
+    let (R_s, held) = (&support.rotation, &support.held);
+    joint.correction = (R_s.tr_mul(&(support.position - section.position)), -phi);
+    let carried = |held: &[bool; 3], lambda: &Vec3| Vec3::from_fn(|i, _| if held[i] { lambda[i] } else { 0.0 });
+    let (force, moment) = (-(joint.by_w * load.n), -(joint.of_moment * load.m));
+    // of the whole moment: it is the free part of it that is to vanish, in axes that turn with the section
+    let (_, derivative) = so3::rate_of_log(&phi, &moment);
+    load.n += R_s * carried(&held.translation, &force);
+    load.m += joint.by_phi.tr_mul(&carried(&held.rotation, &moment));
+    load.m_phi += R_s * derivative * joint.by_phi;
+    joint
+}
+
+/// Springs on a held tip that make the rod on them about as stable as the held one: far stiffer than the rod, and than
+/// the forces in it can outweigh.
+fn springs(mesh: &Mesh, rod: &Rod, state: &State) -> (f64, f64) {
+    let length = mesh.length();
+    let force = state.nodes.iter().map(|node| node.force.amax()).fold(0.0, f64::max);
+    let stiffness = SPRINGS * rod.stiffness.amax() / length + SPRINGS_OF_FORCE * force * length;
+    (stiffness / (length * length), stiffness)
 }
 
 /// u at the tip of an iterate, only needed where a body sits on the tip of a rod with drag. Its derivative is left out
@@ -634,6 +721,9 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
 
 /// The equations of motion at an instant as linear equations for the accelerations: φ stands for R ω_t, w for a + ν u;
 /// the moments at the points are those of the law. Sets these moments in `state`.
+///
+/// A support has no angular acceleration, and its acceleration no rate, at a start: a motion begins smoothly. What it
+/// holds follows it as a rigid body.
 pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundary: &Boundary, system: &mut System) {
     let drag = rod.drag_rate();
     let base = &boundary.base;
@@ -662,6 +752,12 @@ pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundar
         ..Relation::default()
     };
     assemble_rates(mesh, rod, state, state.nodes[0].acceleration, rates, tip, system);
+    // the ends stand still in the axes of their supports
+    hold_rates(boundary, state, system, |support, node| {
+        let spin = support.angular_velocity;
+        let drift = spin.cross(&(state.nodes[node].position - support.position));
+        (support.acceleration + spin.cross(&drift) + (support.velocity + drift) * drag, Vec3::zeros())
+    });
 }
 
 /// The time derivative of those equations: φ stands for R ω_tt, w for the rate of a + ν u. `sweep` holds the
@@ -693,9 +789,40 @@ pub fn assemble_jerks(mesh: &Mesh, rod: &Rod, state: &mut State, sweep: &Sweep, 
             moment: R * (omega.cross(&R.tr_mul(&section.moment)) + rod.stiffness.component_mul(&strain_t)),
         }
     };
-    let tip =
-        Relation { n: state.tip_memory().travel.acceleration.value * (drag * rod.tip_mass), ..Relation::default() };
-    assemble_rates(mesh, rod, state, state.base.acceleration * drag, rates, tip, system);
+    let Boundary { base, tip, .. } = &state.boundary;
+    // what a support exerts turns with it
+    let (force, moment) = state.tip_reaction(rod);
+    let load = Relation {
+        n: state.tip_memory().travel.acceleration.value * (drag * rod.tip_mass) + tip.angular_velocity.cross(&force),
+        m: tip.angular_velocity.cross(&moment),
+        ..Relation::default()
+    };
+    assemble_rates(mesh, rod, state, base.acceleration * drag, rates, load, system);
+    system.base_load.n = base.angular_velocity.cross(&state.nodes[0].force);
+    system.base_load.m = base.angular_velocity.cross(&state.nodes[0].moment);
+    hold_rates(&state.boundary, state, system, |support, node| {
+        let (section, spin) = (&state.nodes[node], support.angular_velocity);
+        let drift = spin.cross(&(section.position - support.position));
+        let a = section.acceleration - (support.velocity + drift) * drag;
+        let a_t = spin.cross(&((a - support.acceleration) * 3.0 - spin.cross(&drift) * 2.0));
+        (a_t + a * drag, spin.cross(&sweep.nodes[node].phi))
+    });
+}
+
+/// Holds the ends of the rates' equations: `rates` gives those of w and φ by support and node, as far as they are held.
+fn hold_rates(
+    boundary: &Boundary,
+    state: &State,
+    system: &mut System,
+    rates: impl Fn(&Support, usize) -> (Vec3, Vec3),
+) {
+    let joint = |support: &Support, node: usize| {
+        let (joint, _) = coordinates(support, &state.nodes[node]);
+        let (w, phi) = rates(support, node);
+        Joint { correction: (joint.by_w * w, joint.by_phi * phi), ..joint }
+    };
+    system.base_joint = (boundary.base.held != Held::CLAMPED).then(|| joint(&boundary.base, 0));
+    system.tip_joint = (boundary.tip.held != Held::FREE).then(|| joint(&boundary.tip, state.nodes.len() - 1));
 }
 
 /// κ_tt at a point that so far moves rigidly, from the angular accelerations in `sweep`.
@@ -760,6 +887,7 @@ fn assemble_rates(
     }
     system.mass = rod.mass_per_length;
     system.base = (base, Vec3::zeros());
+    system.base_load = Relation::default();
     system.tip = Relation {
         n_w: Mat3::from_diagonal_element(-rod.tip_mass),
         m_phi: Mat3::from_diagonal_element(-rod.tip_inertia),
@@ -815,6 +943,10 @@ pub fn load_with_inertia(mesh: &Mesh, rod: &Rod, state: &State, y: &[(Vec3, Vec3
     }
     let (w, phi) = y[y.len() - 1];
     system.base = Default::default();
+    (system.base_load.n, system.base_load.m) = Default::default();
+    for joint in [&mut system.base_joint, &mut system.tip_joint].into_iter().flatten() {
+        joint.correction = Default::default();
+    }
     system.tip.n = w * rod.tip_mass;
     system.tip.m = phi * rod.tip_inertia;
 }

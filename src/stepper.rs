@@ -3,11 +3,15 @@
 //!
 //! A step never changes the state it starts from; the new one is in [`Stepper::state`] after success only.
 
+// R is the paper's letter
+#![allow(non_snake_case)]
+
 use crate::alpha::{Motion, Scheme};
-use crate::boundary::Boundary;
+use crate::boundary::{Boundary, Support};
 use crate::mesh::Mesh;
 use crate::pose::{self, Row, State, Time};
 use crate::rod::Rod;
+use crate::so3;
 use crate::sweep::{Increment, Scales, Singular, Sweep, System};
 use nalgebra::Vector3;
 use std::fmt;
@@ -77,11 +81,8 @@ pub struct Diverged {
 pub enum Reason {
     /// The increments did not become small.
     TooManyIterations,
-    /// The linearised equations of a cell are singular.
-    Singular {
-        /// Index of the cell from the base.
-        cell: usize,
-    },
+    /// The linearised equations have no unique solution.
+    Singular(Singular),
     /// A number overflowed.
     NotFinite,
 }
@@ -92,7 +93,7 @@ impl fmt::Display for Diverged {
         write!(f, "no convergence after {iterations} iterations, scaled residual {residual:.1e}: ")?;
         match reason {
             Reason::TooManyIterations => write!(f, "too many iterations"),
-            Reason::Singular { cell } => write!(f, "singular in cell {}", cell + 1),
+            Reason::Singular(singular) => write!(f, "{singular}"),
             Reason::NotFinite => write!(f, "a number overflowed"),
         }
     }
@@ -147,7 +148,8 @@ impl Stepper {
         let most = |size: fn(&Motion) -> f64| points.iter().map(|memory| size(&memory.spin)).fold(0.0, f64::max);
         let turn = dt * most(|spin| spin.velocity.value.norm());
         let floor = Scheme::from_spectral_radius(0.0);
-        if self.rod.is_extensible() {
+        let of_positions = self.rod.is_extensible() || boundary.holds_positions();
+        if of_positions && (started || self.rod.is_extensible()) {
             let scheme = match (started, turn < RESOLVED) {
                 (false, _) => Scheme::BACKWARD_EULER,
                 (true, true) => scheme,
@@ -184,14 +186,13 @@ impl Stepper {
             .map_err(|diverged| Diverged { iterations: lost + diverged.iterations, ..diverged })
     }
 
-    /// One step of `dt` s to `boundary` with a given scheme and acceleration row; a rod that shears or stretches has
-    /// only
-    /// [`Row::Positions`].
+    /// One step of `dt` s to `boundary` with a given scheme and acceleration row; a rod that shears or stretches, or
+    /// whose ends [hold positions](Boundary::holds_positions), has only [`Row::Positions`].
     ///
     /// # Errors
     /// [`Diverged`]; the state is as before.
     pub fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64, row: Row) -> Result<Report, Diverged> {
-        let row = if self.rod.is_extensible() { Row::Positions } else { row };
+        let row = if self.rod.is_extensible() || boundary.holds_positions() { Row::Positions } else { row };
         self.old.copy_from(&self.state);
         self.old.prepare(scheme, dt);
         self.solve(boundary, &Time::Step { scheme, dt, row })
@@ -243,7 +244,7 @@ impl Stepper {
             if !residual.is_finite() {
                 return Err(diverged(residual, Reason::NotFinite));
             }
-            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular { cell: s.cell }))?;
+            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
 
             let (mut turn, mut force, mut moment) = (0.0f64, 0.0f64, 0.0f64);
             for delta in sweep.nodes.iter().chain(&sweep.points) {
@@ -267,21 +268,39 @@ impl Stepper {
         Err(Diverged { iterations: max_iterations, residual, reason: Reason::TooManyIterations })
     }
 
-    /// The static equilibrium under `boundary`, its loads applied in as many parts as Newton needs.
+    /// The static equilibrium under `boundary`: loads and supports go from those of the present state to `boundary` in
+    /// as many parts as Newton needs.
     ///
     /// # Errors
     /// [`Diverged`] of the smallest part; the state is as before.
     pub fn equilibrium(&mut self, boundary: &Boundary) -> Result<Report, Diverged> {
         let begin = self.state.clone();
+        let (first, last) = (&begin.nodes[0], begin.tip());
         let (mut done, mut part) = (0.0, 1.0);
         let mut iterations = 0;
         loop {
             let share = f64::min(done + part, 1.0);
-            let loaded = Boundary {
-                gravity: boundary.gravity * share,
-                tip_force: boundary.tip_force * share,
-                tip_moment: boundary.tip_moment * share,
-                ..*boundary
+            let from = &begin.boundary;
+            let between = |a: &Vector3<f64>, b: &Vector3<f64>| a * (1.0 - share) + b * share;
+            let moved = |from: &Support, section: &pose::Section, to: &Support| {
+                // a support that held something else, or nothing, was not on its way to this one
+                let (r, R) = match from.held == to.held {
+                    true => (&from.position, &from.rotation),
+                    false => (&section.position, &section.rotation),
+                };
+                let turn = so3::log(&R.tr_mul(&to.rotation)) * share;
+                Support { position: between(r, &to.position), rotation: R * so3::exp(&turn), ..*to }
+            };
+            let loaded = if share < 1.0 {
+                Boundary {
+                    base: moved(&from.base, first, &boundary.base),
+                    tip: moved(&from.tip, last, &boundary.tip),
+                    tip_force: between(&from.tip_force, &boundary.tip_force),
+                    tip_moment: between(&from.tip_moment, &boundary.tip_moment),
+                    gravity: between(&from.gravity, &boundary.gravity),
+                }
+            } else {
+                *boundary
             };
             match self.relax(&loaded) {
                 Ok(report) => {
@@ -316,11 +335,6 @@ impl Stepper {
         let Self { mesh, rod, state, system, sweep, .. } = self;
         pose::assemble(mesh, rod, state, state, boundary, &Time::Static, system);
         load(mesh, rod, state, system);
-        let singular = |s: Singular| Diverged {
-            iterations: 1,
-            residual: f64::INFINITY,
-            reason: Reason::Singular { cell: s.cell },
-        };
         sweep.solve(system).map_err(singular)?;
         Ok((&sweep.nodes, &sweep.points))
     }
@@ -335,19 +349,23 @@ impl Stepper {
         if self.rod.is_extensible() {
             return Ok(());
         }
-        let singular = |cell| Diverged { iterations: 1, residual: f64::INFINITY, reason: Reason::Singular { cell } };
         self.trial.copy_from(&self.state);
-        self.trial.base = boundary.base;
+        self.trial.boundary = *boundary;
         pose::assemble_accelerations(&self.mesh, &self.rod, &mut self.trial, boundary, &mut self.system);
-        self.sweep.solve(&self.system).map_err(|s| singular(s.cell))?;
+        self.sweep.solve(&self.system).map_err(singular)?;
         self.trial.take_accelerations(&self.rod, &self.sweep.nodes, &self.sweep.points);
 
         pose::assemble_jerks(&self.mesh, &self.rod, &mut self.trial, &self.sweep, &mut self.system);
-        self.sweep.solve(&self.system).map_err(|s| singular(s.cell))?;
+        self.sweep.solve(&self.system).map_err(singular)?;
         self.trial.take_jerks(&self.rod, &self.sweep.nodes, &self.sweep.points);
         std::mem::swap(&mut self.state, &mut self.trial);
         Ok(())
     }
+}
+
+/// A linear problem without a unique solution.
+fn singular(singular: Singular) -> Diverged {
+    Diverged { iterations: 1, residual: f64::INFINITY, reason: Reason::Singular(singular) }
 }
 
 /// Sizes of forces, moments and accumulated vectors in this step, and the rounding error of a force.

@@ -114,7 +114,7 @@ fn spin_up() {
     let mut peak = (0.0, 0.0f64);
     run(&mut stepper, steps_between * (times.len() - 1), dt, boundary, |i, stepper| {
         // the base frame: first axis along the undeformed rod
-        let frame = stepper.state.base.rotation * along_x().transpose();
+        let frame = stepper.state.boundary.base.rotation * along_x().transpose();
         let tip = stepper.state.tip();
         let position = frame.tr_mul(&tip.position);
         if position.y.abs() > peak.1.abs() {

@@ -8,9 +8,9 @@ mod full;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::{Boundary, Support};
+use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Row, State, Time, assemble};
+use cosserat_rod::pose::{Row, Section, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
@@ -40,24 +40,37 @@ fn empty(mesh: &Mesh, rod: &Rod) -> System {
 /// block.
 const KINDS: usize = 5;
 
-/// The kinds of the unknowns, block by block.
+/// The kinds of the unknowns, number by number.
 fn unknown_kinds(layout: &Layout) -> Vec<usize> {
     let cell = |_| [PHI, W, N, M].into_iter().chain((0..layout.stages).flat_map(|_| [PHI, W, N, M, G]));
-    (0..layout.cells).flat_map(cell).chain([PHI, W, N, M]).collect()
+    (0..layout.cells).flat_map(cell).chain([PHI, W, N, M]).flat_map(|kind| [kind; 3]).collect()
 }
 
-/// The kinds of the equations, block by block.
-fn equation_kinds(layout: &Layout) -> Vec<usize> {
+/// The kinds of the equations, number by number. Where an end is held, in part, its equations are motions.
+fn equation_kinds(layout: &Layout, system: &System) -> Vec<usize> {
     let points = |_| [PHI, W, N, M, G];
     let cell = |_| [N, M].into_iter().chain((0..layout.stages).flat_map(points)).chain([PHI, W]);
-    [W, PHI].into_iter().chain((0..layout.cells).flat_map(cell)).chain([N, M]).collect()
+    let kinds = [W, PHI].into_iter().chain((0..layout.cells).flat_map(cell)).chain([N, M]);
+    let mut kinds: Vec<usize> = kinds.flat_map(|kind| [kind; 3]).collect();
+    let tip = kinds.len() - 6;
+    for (at, joint) in [(0, &system.base_joint), (tip, &system.tip_joint)] {
+        for (i, held) in joint.iter().flat_map(|joint| joint.held).enumerate() {
+            kinds[at + i] = match (held, i < 3) {
+                (true, true) => W,
+                (true, false) => PHI,
+                (false, true) => N,
+                (false, false) => M,
+            };
+        }
+    }
+    kinds
 }
 
 /// Largest of `part` over the largest of `whole`, of the worst kind.
 fn relative(kinds: &[usize], part: impl Fn(usize) -> f64, whole: impl Fn(usize) -> f64) -> f64 {
     let worst = |kind: usize| {
         let largest =
-            |f: &dyn Fn(usize) -> f64| (0..3 * kinds.len()).filter(|i| kinds[i / 3] == kind).map(f).fold(0.0, f64::max);
+            |f: &dyn Fn(usize) -> f64| (0..kinds.len()).filter(|i| kinds[*i] == kind).map(f).fold(0.0, f64::max);
         let part = largest(&part);
         if part == 0.0 { 0.0 } else { part / largest(&whole) }
     };
@@ -124,7 +137,7 @@ fn compare(mesh: &Mesh, system: &System, sweep: &mut Sweep) -> Outcome {
         reference.iter_mut().zip(&correction).for_each(|(x, dx)| *x += dx);
     }
 
-    let (unknowns, equations) = (unknown_kinds(&layout), equation_kinds(&layout));
+    let (unknowns, equations) = (unknown_kinds(&layout), equation_kinds(&layout, system));
     let residual = |x: &[f64]| {
         let (missed, size) = (matrix.residual(x, &right), matrix.size_of_terms(x));
         relative(&equations, |i| missed[i].abs(), |i| size[i] + right[i].abs())
@@ -158,21 +171,25 @@ fn check(name: &str, rod: &Rod, mesh: &Mesh, dt: Option<f64>, row: Row) -> Outco
     assemble(mesh, rod, &stepper.state, &stepper.state, &boundary, &time, &mut system);
     let mut sweep = Sweep::new(mesh.cells.len(), &mesh.rule, rod.is_extensible());
     let outcome = compare(mesh, &system, &mut sweep);
+    let scene = format!("{name}, {} × {}, {dt:?} s, {row:?}: {outcome:?}", mesh.cells.len(), mesh.rule.stages);
+    judge(&scene, rod, mesh, dt.map_or(0.0, |dt| scheme.rate_weight(dt)), &outcome);
+    outcome
+}
 
+/// The bounds of every comparison; `rate` is ∂v/∂x of the step, 0 for statics.
+fn judge(scene: &str, rod: &Rod, mesh: &Mesh, rate: f64, outcome: &Outcome) {
     // The inertia of a cell over its bending stiffness. A cell much longer than the bending wave of a step, 1 ≪ (h/λ)⁴,
     // moves as it is pushed whatever its stiffness, and its moments at the nodes are differences of larger ones:
     // roundings are lost, in the LU as well. Measured: a hundredth of that many in the residual, a twentieth in the
     // solution, all at 1e-5 s on 30 cells and fewer. The sweep's next solve, which is Newton's next iteration, makes
     // them good.
     let h = mesh.length() / mesh.cells.len() as f64;
-    let inertia = dt.map_or(0.0, |dt| rod.mass_per_length * scheme.rate_weight(dt).powi(2));
+    let inertia = rod.mass_per_length * rate.powi(2);
     let lost = f64::EPSILON * inertia * h.powi(4) / rod.stiffness.x;
-    let scene = format!("{name}, {} × {}, {dt:?} s, {row:?}: {outcome:?}", mesh.cells.len(), mesh.rule.stages);
     assert!(outcome.reference_residual < 1e-15, "no reference: {scene}");
     assert!(outcome.residual < 1e-12 + 0.01 * lost, "{scene}");
     assert!(outcome.error < 1e-9 + 0.05 * lost, "{scene}");
     assert!(outcome.refined[0] < 1e-12 && outcome.refined[1] < 1e-9, "{scene}");
-    outcome
 }
 
 /// The rod with the shear and stretch of its section.
@@ -225,4 +242,58 @@ fn four_hundred_cells() {
     let outcome = check(name, rod, &mesh, Some(1.0 / 30.0), Row::Rotations);
     // measured: 7e-15 and 7e-7
     assert!(outcome.error < 1e-12 && outcome.lu_error > 1e-9, "the LU needs no refinement any more: {outcome:?}");
+}
+
+/// Uniform numbers in [−1, 1] (SplitMix64).
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *seed;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (z ^ (z >> 31)) as f64 / u64::MAX as f64 * 2.0 - 1.0
+}
+
+#[test]
+fn ends_held_in_part() {
+    let mut seed = 1;
+    for (name, length, youngs_modulus, rod) in rods() {
+        for (cells, stages, dt, extends) in (0..64).map(|i| (6 + 4 * (i % 3), 1 + i % 4, STEPS[i % 5], i / 4 % 2 == 1))
+        {
+            let rod = if extends { extensible(&rod, youngs_modulus) } else { rod.clone() };
+            // an arc of one radian: a straight rod that cannot stretch, held along its axis, bears any force
+            let mesh = Mesh::uniform(length, cells, stages, Vector3::new(0.8, 0.6, 0.3) / length);
+            let mut boundary = horizontal();
+            let mut stepper = Stepper::new(mesh.clone(), rod.clone(), State::at_rest_shape(&mesh, &boundary.base));
+            let scheme = Scheme::from_spectral_radius(0.0);
+            for _ in 0..3 {
+                stepper.step(&boundary, scheme, dt.unwrap_or(1e-3), Row::Positions).unwrap();
+            }
+            let mut mix = || -> Held {
+                let mut three = || [(); 3].map(|()| random(&mut seed) > 0.0);
+                Held { translation: three(), rotation: three() }
+            };
+            let mut held = [mix(), mix()];
+            if dt.is_none() {
+                // nothing that could move freely
+                held[0] = if cells == 6 { Held::PINNED } else { Held::CLAMPED };
+                held[1].translation[0] |= cells == 6;
+                held[1].rotation = if cells == 6 { [true; 3] } else { held[1].rotation };
+            }
+            // half a radian and a hundredth of a length away
+            let mut support = |section: &Section, held: Held| {
+                let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random(&mut seed));
+                let position = section.position + vector(0.01 * length);
+                Support { held, ..Support::at_rest(position, section.rotation * so3::exp(&vector(0.3))) }
+            };
+            boundary.base = support(&stepper.state.nodes[0], held[0]);
+            boundary.tip = support(stepper.state.tip(), held[1]);
+            let time = dt.map_or(Time::Static, |dt| Time::Step { scheme, dt, row: Row::Positions });
+            let mut system = empty(&mesh, &rod);
+            assemble(&mesh, &rod, &stepper.state, &stepper.state, &boundary, &time, &mut system);
+            let mut sweep = Sweep::new(cells, &mesh.rule, rod.is_extensible());
+            let outcome = compare(&mesh, &system, &mut sweep);
+            let scene = format!("{name}, {cells} × {stages}, {dt:?} s, {held:?}, stretches {extends}: {outcome:?}");
+            judge(&scene, &rod, &mesh, dt.map_or(0.0, |dt| scheme.rate_weight(dt)), &outcome);
+        }
+    }
 }

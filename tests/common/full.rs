@@ -5,7 +5,7 @@
 //! every point, for Φ₁, w₁, and at the end the two of the tip. Φ is expressed by the rotations: Φ_k = T_k⁻¹ (φ_k − φ₀).
 
 use cosserat_rod::mesh::{Gauss, MAX_STAGES};
-use cosserat_rod::sweep::{Relation, System};
+use cosserat_rod::sweep::{Joint, Relation, System};
 use nalgebra::{Matrix3, Vector3};
 
 /// Places of the unknowns of a node or point within it.
@@ -62,8 +62,31 @@ impl Full {
         let mut right = vec![Vector3::zeros(); layout.blocks()];
         let inverse = |m: &Matrix3<f64>| m.try_inverse().expect("T = R J_r is regular for |Φ| < 2π");
 
-        entries.extend([(0, W, one), (1, PHI, one)]);
-        (right[0], right[1]) = system.base;
+        // the six equations of an end that is held in part: coordinate by coordinate its motion or its balance
+        let joint = |entries: &mut Vec<_>, row, at, joint: &Joint, load: &Relation| {
+            let [a, b, c, d, e, f] = joint.held.map(|held| if held { 1.0 } else { 0.0 });
+            let held = [Matrix3::from_diagonal(&[a, b, c].into()), Matrix3::from_diagonal(&[d, e, f].into())];
+            let free = held.map(|held| one - held);
+            let (force, moment) = (free[0] * joint.by_w, free[1] * joint.of_moment);
+            entries.extend([
+                (row, at + W, held[0] * joint.by_w - force * load.n_w),
+                (row, at + PHI, -force * load.n_phi),
+                (row, at + N, force),
+                (row + 1, at + PHI, held[1] * joint.by_phi - moment * load.m_phi),
+                (row + 1, at + W, -moment * load.m_w),
+                (row + 1, at + M, moment),
+            ]);
+            let (w, phi) = joint.correction;
+            (held[0] * w + force * load.n, held[1] * phi + moment * load.m)
+        };
+
+        (right[0], right[1]) = match &system.base_joint {
+            Some(base) => joint(&mut entries, 0, 0, base, &system.base_load),
+            None => {
+                entries.extend([(0, W, one), (1, PHI, one)]);
+                system.base
+            }
+        };
 
         for (j, ends) in system.cells.iter().enumerate() {
             let h = ends.length;
@@ -128,10 +151,15 @@ impl Full {
         }
 
         let (row, tip) = (layout.blocks() - 2, layout.node(layout.cells));
-        let Relation { n_w, n_phi, m_w, m_phi, n, m } = system.tip;
-        entries.extend([(row, tip + N, one), (row, tip + W, -n_w), (row, tip + PHI, -n_phi)]);
-        entries.extend([(row + 1, tip + M, one), (row + 1, tip + W, -m_w), (row + 1, tip + PHI, -m_phi)]);
-        (right[row], right[row + 1]) = (n, m);
+        (right[row], right[row + 1]) = match &system.tip_joint {
+            Some(held) => joint(&mut entries, row, tip, held, &system.tip),
+            None => {
+                let Relation { n_w, n_phi, m_w, m_phi, n, m } = system.tip;
+                entries.extend([(row, tip + N, one), (row, tip + W, -n_w), (row, tip + PHI, -n_phi)]);
+                entries.extend([(row + 1, tip + M, one), (row + 1, tip + W, -m_w), (row + 1, tip + PHI, -m_phi)]);
+                (n, m)
+            }
+        };
         Self { layout, entries, right }
     }
 
@@ -139,7 +167,19 @@ impl Full {
     #[allow(dead_code)]
     pub fn with_right(&self, system: &System, right: &[Vector3<f64>]) -> System {
         let mut other = system.clone();
+        let row = self.layout.blocks() - 2;
         other.base = (right[0], right[1]);
+        (other.tip.n, other.tip.m) = (right[row], right[row + 1]);
+        for (joint, load, (w, phi)) in [
+            (&mut other.base_joint, &mut other.base_load, (right[0], right[1])),
+            (&mut other.tip_joint, &mut other.tip, (right[row], right[row + 1])),
+        ] {
+            if let Some(joint) = joint {
+                // as coordinates of the end, and as forces on them
+                joint.correction = (w, phi);
+                (load.n, load.m) = (joint.by_w.tr_mul(&w), joint.by_phi.tr_mul(&phi));
+            }
+        }
         for (j, ends) in other.cells.iter_mut().enumerate() {
             let mut rows = right[self.layout.equations(j)..].iter().map(|b| -b);
             let mut next = || rows.next().expect("a row for every equation");
@@ -150,8 +190,6 @@ impl Full {
             }
             (ends.e_log, ends.e_w) = (next(), next());
         }
-        let row = self.layout.blocks() - 2;
-        (other.tip.n, other.tip.m) = (right[row], right[row + 1]);
         other
     }
 }

@@ -47,12 +47,6 @@ impl Case {
         self.compare(name, computed, &expected, |i| expected[i].abs());
     }
 
-    /// As [`Self::check`], for the first of the values only.
-    pub fn check_first(&self, name: &str, computed: f64) {
-        let expected = self.expected(name)[0];
-        self.compare(name, &[computed], &[expected], |_| expected.abs());
-    }
-
     /// As [`Self::check`] for vectors, a relative tolerance being relative to the length of the vector: its direction
     /// is no worse known than its length, and a component may vanish.
     pub fn check_vectors(&self, name: &str, computed: &[Vector3<f64>]) {
