@@ -4,13 +4,13 @@
 #![allow(unsafe_code)]
 
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::{Boundary, Support};
+use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -61,14 +61,27 @@ fn a_step_allocates_nothing() {
         tip_moment: Vector3::new(0.0, 0.0, 1e-3),
         ..Boundary::hanging_from(Support::at_rest(Vector3::zeros(), Matrix3::identity()), Vector3::new(9.81, 0.0, 0.0))
     };
+    // a hinge at the base, and a tip that slides along the first axis of its support, which stands where the tip of a
+    // rod bent by 2 rad is at rest
+    let turned = Rotation3::new(Vector3::y() * 2.0);
+    let held = Boundary {
+        base: Support { held: Held { rotation: [true, false, true], ..Held::CLAMPED }, ..boundary.base },
+        tip: Support {
+            held: Held { translation: [false, true, true], rotation: [true, false, false] },
+            ..Support::at_rest(Vector3::new((1.0 - 2f64.cos()) / 2.0, 0.0, 2f64.sin() / 2.0), *turned.matrix())
+        },
+        ..boundary
+    };
     for stages in 1..=4 {
-        for (rod, row) in [
-            (&loaded, Row::Rotations),
-            (&damped, Row::Rotations),
-            (&damped, Row::Positions),
-            (&extensible, Row::Positions),
+        for (rod, row, boundary, curvature) in [
+            (&loaded, Row::Rotations, boundary, 0.0),
+            (&damped, Row::Rotations, boundary, 0.0),
+            (&damped, Row::Positions, boundary, 0.0),
+            (&extensible, Row::Positions, boundary, 0.0),
+            (&damped, Row::Positions, held, 2.0),
+            (&extensible, Row::Positions, held, 2.0),
         ] {
-            let mesh = Mesh::uniform(1.0, 8, stages, Vector3::zeros());
+            let mesh = Mesh::uniform(1.0, 8, stages, Vector3::new(0.0, curvature, 0.0));
             let state = State::at_rest_shape(&mesh, &boundary.base);
             let mut stepper = Stepper::new(mesh, rod.clone(), state);
             let count = allocations(|| {

@@ -7,7 +7,7 @@ use cosserat_rod::alpha::Scheme;
 use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::energy::Energy;
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::{Row, State};
+use cosserat_rod::pose::{Row, Section, State};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -32,17 +32,17 @@ fn bent_and_twisted(cells: usize, stages: usize) -> Mesh {
 }
 
 fn turned(by: &Matrix3<f64>, shifted: &Vector3<f64>, boundary: &Boundary) -> Boundary {
-    let base = &boundary.base;
+    let support = |support: &Support| Support {
+        position: by * support.position + shifted,
+        rotation: by * support.rotation,
+        velocity: by * support.velocity,
+        angular_velocity: by * support.angular_velocity,
+        acceleration: by * support.acceleration,
+        ..*support
+    };
     Boundary {
-        base: Support {
-            position: by * base.position + shifted,
-            rotation: by * base.rotation,
-            velocity: by * base.velocity,
-            angular_velocity: by * base.angular_velocity,
-            acceleration: by * base.acceleration,
-            ..*base
-        },
-        tip: boundary.tip,
+        base: support(&boundary.base),
+        tip: support(&boundary.tip),
         tip_force: by * boundary.tip_force,
         tip_moment: by * boundary.tip_moment,
         gravity: by * boundary.gravity,
@@ -108,7 +108,7 @@ fn a_turned_and_shifted_scene_has_a_turned_and_shifted_answer() {
         };
         compare(&by, &shifted, &run(&shaken), &run(&|t| turned(&by, &shifted, &shaken(t))), 1e-8);
     }
-    for rod in [furnished(), stretching] {
+    for rod in [furnished(), stretching.clone()] {
         let rest = |boundary: &Boundary| {
             let mut stepper = unstressed(mesh.clone(), rod.clone(), boundary);
             stepper.equilibrium(boundary).expect("an equilibrium");
@@ -116,6 +116,30 @@ fn a_turned_and_shifted_scene_has_a_turned_and_shifted_answer() {
         };
         let boundary = shaken(0.0);
         compare(&by, &shifted, &rest(&boundary), &rest(&turned(&by, &shifted, &boundary)), 1e-8);
+    }
+    // with both ends held in part, from where they hang together
+    for rod in [furnished(), stretching] {
+        let held = |boundary: &Boundary, at: &Section| Boundary {
+            base: Support { held: Held { rotation: [false, true, true], ..Held::CLAMPED }, ..boundary.base },
+            tip: Support {
+                held: Held { translation: [true, false, true], rotation: [false, true, true] },
+                ..Support::at_rest(at.position, at.rotation)
+            },
+            ..*boundary
+        };
+        let run = |boundary: &dyn Fn(f64) -> Boundary| {
+            let mut stepper = unstressed(mesh.clone(), rod.clone(), &boundary(0.0));
+            stepper.equilibrium(&boundary(0.0)).expect("an equilibrium");
+            let at = *stepper.state.tip();
+            stepper.start(&held(&boundary(0.0), &at)).expect("a start");
+            for i in 1..=30 {
+                let now = held(&boundary(f64::from(i) * 0.002), &at);
+                let result = stepper.advance(&now, Scheme::from_spectral_radius(0.5), 0.002);
+                result.unwrap_or_else(|diverged| panic!("held, step {i}: {diverged}"));
+            }
+            stepper.state
+        };
+        compare(&by, &shifted, &run(&shaken), &run(&|t| turned(&by, &shifted, &shaken(t))), 1e-8);
     }
 }
 
