@@ -73,11 +73,17 @@ impl Scheme {
         (1.0 - self.alpha) / ((1.0 - self.beta) * self.gamma * dt)
     }
 
+    /// ẋᵢ from xᵢ − xᵢ₋₁ and ẋᵢ₋₁ (eq 19; with arc length in place of time eq 20).
+    #[inline]
+    pub fn auxiliary(&self, old: &Vector3<f64>, increment: &Vector3<f64>, dt: f64) -> Vector3<f64> {
+        increment / (self.gamma * dt) - old * ((1.0 - self.gamma) / self.gamma)
+    }
+
     /// The rates at tᵢ from xᵢ − xᵢ₋₁ and the rates at tᵢ₋₁ (eq 19, then eq 17).
     #[inline]
     pub fn rate(&self, old: &Rate, increment: &Vector3<f64>, dt: f64) -> Rate {
-        let Self { alpha, beta, gamma } = *self;
-        let auxiliary = increment / (gamma * dt) - old.auxiliary * ((1.0 - gamma) / gamma);
+        let Self { alpha, beta, .. } = *self;
+        let auxiliary = self.auxiliary(&old.auxiliary, increment, dt);
         let value = (auxiliary * (1.0 - alpha) + old.auxiliary * alpha - old.value * beta) / (1.0 - beta);
         Rate { auxiliary, value }
     }
@@ -143,6 +149,13 @@ impl Scheme {
 }
 
 impl Motion {
+    /// Whether all its numbers are.
+    pub fn is_finite(&self) -> bool {
+        let Self { velocity: v, acceleration: a, jerk } = self;
+        let vectors = [&v.auxiliary, &v.value, &a.auxiliary, &a.value, jerk];
+        vectors.into_iter().all(|vector| vector.iter().all(|x| x.is_finite()))
+    }
+
     /// The true rates v, a and ȧ at the start of a motion.
     pub fn starting(v: Vector3<f64>, a: Vector3<f64>, jerk: Vector3<f64>) -> Self {
         Self { velocity: Rate::at_start(v), acceleration: Rate::at_start(a), jerk }

@@ -50,6 +50,12 @@ impl Support {
         Self { position, rotation, velocity: zero, angular_velocity: zero, acceleration: zero, held }
     }
 
+    fn is_finite(&self) -> bool {
+        let Self { position, rotation, velocity, angular_velocity, acceleration, held: _ } = self;
+        let vectors = [position, velocity, angular_velocity, acceleration];
+        vectors.into_iter().flatten().chain(rotation).all(|x| x.is_finite())
+    }
+
     /// No support.
     pub fn free() -> Self {
         Self { held: Held::FREE, ..Self::at_rest(Vec3::zeros(), Mat3::identity()) }
@@ -75,6 +81,13 @@ impl Boundary {
     /// A base, a free tip without loads.
     pub fn hanging_from(base: Support, gravity: Vec3) -> Self {
         Self { base, tip: Support::free(), tip_force: Vec3::zeros(), tip_moment: Vec3::zeros(), gravity }
+    }
+
+    /// Whether all its numbers are.
+    pub fn is_finite(&self) -> bool {
+        let Self { base, tip, tip_force, tip_moment, gravity } = self;
+        let vectors = [tip_force, tip_moment, gravity];
+        base.is_finite() && tip.is_finite() && vectors.into_iter().flatten().all(|x| x.is_finite())
     }
 
     /// Whether the positions say more than the rotations: where the base is not a clamp, or a translation of the tip is

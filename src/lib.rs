@@ -10,18 +10,25 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> unit -> {path, modes, stepper} -> {alpha, sweep, pose -> boundary, rod -> mesh -> so3}
+//! host =C=> fmi2 -> unit -> {path, modes, energy, stepper} -> pose -> sweep
+//!         examples, tests -> rate -> formulation -> {energy, stepper}
+//!                       pose, rate -> {alpha, boundary, rod, mesh, so3}
 //! ```
+//!
+//! The rod is formulated twice, on the same rods, meshes, ends, time schemes and rotations: by [`pose`], which
+//! [`stepper`] solves and the unit moves, and by [`rate`], which is the paper's and solves itself. [`formulation`] is
+//! what both offer to those who set one beside the other; [`stepper`] says for both what a step reports and why it
+//! fails. The unit knows neither [`rate`] nor [`formulation`].
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
 //!    line, and the rest compiles.
 //! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread,
 //!    clock or mutable static in the library.
-//! 4. [`sweep`] knows blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] knows which unknowns a section
-//!    has.
-//! 5. [`pose::State`] is plain data; everything a later step depends on is in it. Rebuilding the storage around it changes
-//!    no bit of any result. Same inputs, same bits.
+//! 4. [`sweep`] and [`rate::Band`] know blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] and [`rate`]
+//!    know which unknowns a section has.
+//! 5. [`pose::State`] and [`rate::State`] are plain data; everything a later step depends on is in them. Rebuilding the
+//!    storage around them changes no bit of any result. Same inputs, same bits.
 //! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry
 //!    with smaller steps lives in [`mod@unit`], never in Newton.
 //!
@@ -52,6 +59,7 @@ pub mod pose;
 pub mod energy;
 pub mod stepper;
 pub mod formulation;
+pub mod rate;
 pub mod modes;
 pub mod path;
 pub mod unit;

@@ -232,6 +232,21 @@ impl State {
         }
     }
 
+    /// Whether all numbers of its sections, histories and ends are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let finite = |vector: &Vec3| vector.iter().all(|x| x.is_finite());
+        let section = |section: &Section| {
+            let Section { position, rotation, turn, force, moment, acceleration } = section;
+            let vectors = [position, turn, force, moment, acceleration];
+            vectors.into_iter().all(finite) && rotation.iter().all(|x| x.is_finite())
+        };
+        let memory = |Memory { spin, travel, kappa, strain }: &Memory| {
+            finite(kappa) && [spin, travel, strain].into_iter().all(Motion::is_finite)
+        };
+        let sections = self.nodes.iter().chain(&self.points).all(section);
+        self.boundary.is_finite() && sections && self.memory.iter().all(memory)
+    }
+
     /// The section at the tip.
     pub fn tip(&self) -> &Section {
         &self.nodes[self.nodes.len() - 1]

@@ -7,7 +7,7 @@
 #![allow(non_snake_case)]
 
 use crate::alpha::{Motion, Scheme};
-use crate::boundary::{Boundary, Support};
+use crate::boundary::{Boundary, Held, Support};
 use crate::mesh::Mesh;
 use crate::pose::{self, Row, State, Time};
 use crate::rod::Rod;
@@ -83,8 +83,10 @@ pub enum Reason {
     TooManyIterations,
     /// The linearised equations have no unique solution.
     Singular(Singular),
-    /// A number overflowed.
+    /// A number overflowed, or was given as none.
     NotFinite,
+    /// The formulation clamps the base, which is to hold this only.
+    BaseLetGo(Held),
 }
 
 impl fmt::Display for Diverged {
@@ -94,7 +96,8 @@ impl fmt::Display for Diverged {
         match reason {
             Reason::TooManyIterations => write!(f, "too many iterations"),
             Reason::Singular(singular) => write!(f, "{singular}"),
-            Reason::NotFinite => write!(f, "a number overflowed"),
+            Reason::NotFinite => write!(f, "a number is not finite"),
+            Reason::BaseLetGo(held) => write!(f, "the base is to be clamped, and holds {held:?}"),
         }
     }
 }
@@ -221,6 +224,11 @@ impl Stepper {
             },
         }?;
         self.trial.settle(&self.mesh, &self.rod, &self.old, boundary, time);
+        // the last increment, and what has no part in the residual
+        if !self.trial.is_finite() {
+            let Report { iterations, residual, .. } = result;
+            return Err(Diverged { iterations, residual, reason: Reason::NotFinite });
+        }
         std::mem::swap(&mut self.state, &mut self.trial);
         Ok(result)
     }

@@ -7,6 +7,7 @@ use cosserat_rod::alpha::Scheme;
 use cosserat_rod::boundary::{Boundary, Held, Support};
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Row, State};
+use cosserat_rod::rate;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
@@ -96,6 +97,25 @@ fn a_step_allocates_nothing() {
             });
             assert_eq!(count, 0, "{stages} stages, {row:?}, {rod:?}");
         }
+    }
+}
+
+#[test]
+fn a_step_of_the_rate_formulation_allocates_nothing() {
+    let boundary =
+        Boundary::hanging_from(Support::at_rest(Vector3::zeros(), Matrix3::identity()), Vector3::new(9.81, 0.0, 0.0));
+    for options in [rate::Options::AS_PRINTED, rate::Options::MENDED] {
+        let mesh = Mesh::uniform(1.0, 8, 1, Vector3::zeros());
+        let rod = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+        let mut stepper = rate::Stepper::new(mesh, rod, &boundary, options).unwrap();
+        let count = allocations(|| {
+            for _ in 0..5 {
+                stepper.step(&boundary, Scheme::from_spectral_radius(0.5), 5e-3).unwrap();
+            }
+            let absurd = Boundary { tip_force: Vector3::new(1e300, 0.0, 0.0), ..boundary };
+            stepper.step(&absurd, Scheme::BACKWARD_EULER, 5e-3).unwrap_err();
+        });
+        assert_eq!(count, 0, "{options:?}");
     }
 }
 

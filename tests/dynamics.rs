@@ -4,35 +4,39 @@
 
 mod common;
 
-use common::{Case, along_x, angle, clamped, kirchhoff, unstressed};
+use common::{Case, along_x, angle, by_poses, by_rates, clamped, kirchhoff, unstressed};
 use cosserat_rod::alpha::{Motion, Scheme};
 use cosserat_rod::boundary::{Boundary, Support};
+use cosserat_rod::formulation::Formulation;
 use cosserat_rod::mesh::Mesh;
-use cosserat_rod::pose::Row;
+use cosserat_rod::rate::{self, Options};
 use cosserat_rod::rod::Rod;
-use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// The spectral radius at infinity of all runs here: what the mesh cannot follow dies out in a few steps.
 const RADIUS: f64 = 0.5;
 
-/// Steps of `dt` up to `end`; `boundary` and `visit` get the time.
-fn run(
-    stepper: &mut Stepper,
+/// Steps of `dt`; `boundary` and `visit` get the time, and `visit` the rod before the first step too.
+fn run<F: Formulation>(
+    rod: &mut F,
     steps: usize,
     dt: f64,
     boundary: impl Fn(f64) -> Boundary,
-    mut visit: impl FnMut(usize, &Stepper),
+    mut visit: impl FnMut(usize, &F),
 ) {
-    stepper.start(&boundary(0.0)).expect("accelerations at the start");
-    visit(0, stepper);
+    visit(0, rod);
     for i in 1..=steps {
         let scheme = Scheme::from_spectral_radius(RADIUS);
-        let result = stepper.step(&boundary(i as f64 * dt), scheme, dt, Row::Rotations);
+        let result = rod.step(&boundary(i as f64 * dt), scheme, dt);
         result.unwrap_or_else(|diverged| panic!("step {i}: {diverged}"));
-        visit(i, stepper);
+        visit(i, rod);
     }
+}
+
+/// The rate formulation as it is at its best.
+fn by_mended_rates(mesh: Mesh, rod: Rod, boundary: &Boundary) -> rate::Stepper {
+    by_rates(mesh, rod, boundary, Options::MENDED)
 }
 
 /// The inertia of a plane beam without rotary inertia. About its own axis a section must have some, or nothing tells
@@ -46,31 +50,33 @@ fn unwound(angle: f64, last: f64) -> f64 {
     angle + TAU * ((last - angle) / TAU).round()
 }
 
-#[test]
-fn heavy_rod_released_from_the_horizontal() {
+/// A heavy rod released from the horizontal, on `cells` of `stages`, in `steps` from one instant to the next.
+fn heavy_rod_released<F: Formulation>(
+    begin: fn(Mesh, Rod, &Boundary) -> F,
+    (cells, stages): (usize, usize),
+    steps: usize,
+) {
     let case = Case::read("c6_heavy_rod_release");
     let times = case.inputs("times");
-    let steps_between = 80;
-    let dt = times[1] / steps_between as f64;
-    let mesh = Mesh::uniform(case.input("L"), 5, 4, Vector3::zeros());
+    let dt = times[1] / steps as f64;
+    let mesh = Mesh::uniform(case.input("L"), cells, stages, Vector3::zeros());
     let rod = Rod {
         mass_per_length: case.input("rhoA"),
         inertia_per_length: without_rotary_inertia(),
         ..kirchhoff(case.input("EI"), 1.0)
     };
     let boundary = Boundary { gravity: -Vector3::y() * case.input("g"), ..clamped(along_x()) };
-    let mut stepper = unstressed(mesh, rod, &boundary);
     let (mut x, mut y, mut theta) = (vec![], vec![], vec![]);
     let mut last = 0.0;
     run(
-        &mut stepper,
-        steps_between * (times.len() - 1),
+        &mut begin(mesh, rod, &boundary),
+        steps * (times.len() - 1),
         dt,
         |_| boundary,
-        |i, stepper| {
-            let tip = stepper.state.tip();
+        |i, rod| {
+            let tip = rod.tip();
             last = unwound(angle(&tip.rotation), last);
-            if i % steps_between == 0 {
+            if i % steps == 0 {
                 x.push(tip.position.x);
                 y.push(tip.position.y);
                 theta.push(last);
@@ -83,11 +89,20 @@ fn heavy_rod_released_from_the_horizontal() {
 }
 
 #[test]
-fn spin_up() {
+fn heavy_rod_released_from_the_horizontal() {
+    heavy_rod_released(by_poses, (5, 4), 80);
+}
+
+#[test]
+fn heavy_rod_released_from_the_horizontal_by_rates() {
+    heavy_rod_released(by_mended_rates, (120, 1), 120);
+}
+
+/// A rod that its base spins up about an axis across it, on `cells` of `stages`, in `steps` per second.
+fn spun_up<F: Formulation>(begin: fn(Mesh, Rod, &Boundary) -> F, (cells, stages): (usize, usize), steps: usize) {
     let case = Case::read("c6_spin_up_inextensible");
     let times = case.inputs("times");
-    let steps_between = 40;
-    let dt = (times[1] - times[0]) / steps_between as f64;
+    let dt = (times[1] - times[0]) / steps as f64;
     let (length, rotary) = (case.input("L"), case.input("rhoI"));
     let (t_s, omega_s) = (case.input("T_s"), case.input("omega_s"));
     let turn = |t: f64| {
@@ -109,18 +124,18 @@ fn spin_up() {
         inertia_per_length: Vector3::new(rotary, rotary, 2.0 * rotary),
         ..kirchhoff(case.input("EI"), case.input("EI"))
     };
-    let mut stepper = unstressed(Mesh::uniform(length, 2, 4, Vector3::zeros()), rod, &boundary(0.0));
+    let mut rod = begin(Mesh::uniform(length, cells, stages, Vector3::zeros()), rod, &boundary(0.0));
     let (mut axial, mut transverse, mut rotation) = (vec![], vec![], vec![]);
     let mut peak = (0.0, 0.0f64);
-    run(&mut stepper, steps_between * (times.len() - 1), dt, boundary, |i, stepper| {
+    run(&mut rod, steps * (times.len() - 1), dt, boundary, |i, rod| {
         // the base frame: first axis along the undeformed rod
-        let frame = stepper.state.boundary.base.rotation * along_x().transpose();
-        let tip = stepper.state.tip();
+        let frame = boundary(i as f64 * dt).base.rotation * along_x().transpose();
+        let tip = rod.tip();
         let position = frame.tr_mul(&tip.position);
         if position.y.abs() > peak.1.abs() {
             peak = (i as f64 * dt, position.y);
         }
-        if i % steps_between == 0 {
+        if i % steps == 0 {
             axial.push(position.x - length);
             transverse.push(position.y);
             rotation.push(angle(&frame.tr_mul(&tip.rotation)));
@@ -131,6 +146,16 @@ fn spin_up() {
     case.check("tip rotation", &rotation);
     // the time of the peak is that of a sample, there as here
     case.check("peak |u2|", &[peak.0, peak.1]);
+}
+
+#[test]
+fn spin_up() {
+    spun_up(by_poses, (2, 4), 40);
+}
+
+#[test]
+fn spin_up_by_rates() {
+    spun_up(by_mended_rates, (50, 1), 50);
 }
 
 /// The steady deflection of a cantilever on a base shaken by 1: w(s) = cosh ks + a (cos ks − cosh ks) + b (sin ks −
@@ -177,6 +202,7 @@ fn shaken_base_in_its_steady_state() {
             let turning = Vector3::z() * (speed * slope);
             memory.spin = Motion::starting(section.rotation.tr_mul(&turning), zero, zero);
         }
+        stepper.start(&boundary(0.0)).expect("accelerations at the start");
         run(&mut stepper, steps, dt, boundary, |_, _| ());
         tip.push(stepper.state.tip().position.y / amplitude);
         // m_z = EI w'' and m_s = −r_s × n

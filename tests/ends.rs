@@ -2,6 +2,8 @@
 #![allow(missing_docs)]
 
 mod common;
+#[path = "common/random.rs"]
+mod random;
 
 use common::{Case, along_x, clamped, fitted_order, kirchhoff, ramp, unstressed};
 use cosserat_rod::alpha::Scheme;
@@ -15,6 +17,7 @@ use cosserat_rod::so3;
 use cosserat_rod::stepper::{Reason, Stepper};
 use cosserat_rod::sweep::{Joint, Singular, Sweep, System};
 use nalgebra::{Matrix3, Vector3};
+use random::uniform;
 use std::f64::consts::PI;
 
 type Vec3 = Vector3<f64>;
@@ -332,17 +335,8 @@ fn second_order_in_time_with_a_driven_tip() {
     }
 }
 
-/// Uniform numbers in [−1, 1] (SplitMix64).
-fn random(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *seed;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (z ^ (z >> 31)) as f64 / u64::MAX as f64 * 2.0 - 1.0
-}
-
 fn mix(seed: &mut u64) -> Held {
-    let mut three = || [(); 3].map(|()| random(seed) > 0.0);
+    let mut three = || [(); 3].map(|()| uniform(seed) > 0.0);
     Held { translation: three(), rotation: three() }
 }
 

@@ -4,6 +4,8 @@
 
 #[path = "common/full.rs"]
 mod full;
+#[path = "common/random.rs"]
+mod random;
 
 use cosserat_rod::alpha::{Motion, Rate, Scheme};
 use cosserat_rod::boundary::{Boundary, Held, Support};
@@ -14,6 +16,7 @@ use cosserat_rod::so3;
 use cosserat_rod::sweep::{Scales, System};
 use full::{Full, G, Layout, M, N, PHI, W};
 use nalgebra::{Matrix3, Vector3};
+use random::uniform;
 use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -351,16 +354,12 @@ fn held(support: &Support, end: &Unknowns, force: Vec, moment: Vec) -> [Vec; 2] 
     ]
 }
 
-/// Uniform numbers (SplitMix64).
+/// Uniform numbers.
 struct Random(u64);
 
 impl Random {
     fn number(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
+        0.5 * (1.0 + uniform(&mut self.0))
     }
     /// Components in [−size, size].
     fn vector(&mut self, size: f64) -> Vector3<f64> {

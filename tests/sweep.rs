@@ -5,6 +5,8 @@
 mod banded;
 #[path = "common/full.rs"]
 mod full;
+#[path = "common/random.rs"]
+mod random;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
@@ -17,6 +19,7 @@ use cosserat_rod::stepper::Stepper;
 use cosserat_rod::sweep::{Increment, Sweep, System};
 use full::{Full, G, Layout, M, N, PHI, W};
 use nalgebra::{Vector3, Vector4};
+use random::uniform;
 
 /// Length, Young's modulus and the rest.
 fn rods() -> [(&'static str, f64, f64, Rod); 3] {
@@ -244,15 +247,6 @@ fn four_hundred_cells() {
     assert!(outcome.error < 1e-12 && outcome.lu_error > 1e-9, "the LU needs no refinement any more: {outcome:?}");
 }
 
-/// Uniform numbers in [−1, 1] (SplitMix64).
-fn random(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *seed;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (z ^ (z >> 31)) as f64 / u64::MAX as f64 * 2.0 - 1.0
-}
-
 #[test]
 fn ends_held_in_part() {
     let mut seed = 1;
@@ -269,7 +263,7 @@ fn ends_held_in_part() {
                 stepper.step(&boundary, scheme, dt.unwrap_or(1e-3), Row::Positions).unwrap();
             }
             let mut mix = || -> Held {
-                let mut three = || [(); 3].map(|()| random(&mut seed) > 0.0);
+                let mut three = || [(); 3].map(|()| uniform(&mut seed) > 0.0);
                 Held { translation: three(), rotation: three() }
             };
             let mut held = [mix(), mix()];
@@ -281,7 +275,7 @@ fn ends_held_in_part() {
             }
             // half a radian and a hundredth of a length away
             let mut support = |section: &Section, held: Held| {
-                let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random(&mut seed));
+                let mut vector = |size: f64| Vector3::from_fn(|_, _| size * uniform(&mut seed));
                 let position = section.position + vector(0.01 * length);
                 Support { held, ..Support::at_rest(position, section.rotation * so3::exp(&vector(0.3))) }
             };

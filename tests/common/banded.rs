@@ -1,7 +1,7 @@
 //! A banded LU with partial pivoting: the oracle of the sweep. It knows only numbers.
 
 use crate::full::Full;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A band matrix by rows, with room for the fill of row exchanges.
 pub struct Banded {
@@ -14,14 +14,20 @@ pub struct Banded {
 impl Banded {
     /// The matrix of a system.
     pub fn new(full: &Full) -> Self {
+        Self::of_blocks(full.layout.blocks(), &full.entries)
+    }
+
+    /// The matrix of `blocks` by `blocks` blocks, from the row, column and value of those there are; such at the same
+    /// place add up.
+    pub fn of_blocks(blocks: usize, entries: &[(usize, usize, Matrix3<f64>)]) -> Self {
         let reach = |distance: &dyn Fn(usize, usize) -> usize| {
-            full.entries.iter().map(|(row, column, _)| 3 * distance(*row, *column) + 2).max().unwrap_or(0)
+            entries.iter().map(|(row, column, _)| 3 * distance(*row, *column) + 2).max().unwrap_or(0)
         };
         let below = reach(&|row, column| row.saturating_sub(column));
         let above = reach(&|row, column| column.saturating_sub(row));
-        let size = 3 * full.layout.blocks();
+        let size = 3 * blocks;
         let mut matrix = Self { size, below, above, rows: vec![0.0; size * (2 * below + above + 1)] };
-        for (row, column, block) in &full.entries {
+        for (row, column, block) in entries {
             for i in 0..3 {
                 for j in 0..3 {
                     *matrix.at(3 * row + i, 3 * column + j) += block[(i, j)];

@@ -6,10 +6,12 @@
 use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Section, State};
+use cosserat_rod::rate::{self, Options};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
+use std::f64::consts::PI;
 
 /// A reference case: inputs, and expected values with their tolerances.
 pub struct Case {
@@ -113,6 +115,16 @@ pub fn kirchhoff(bending: f64, twist: f64) -> Rod {
     }
 }
 
+/// A hair fibre, A = 1.5e-5 cm²; 25 cm of it are released.
+pub fn hair() -> Rod {
+    Rod::circular((1.5e-9 / PI).sqrt(), 3.89e9, 0.89e9, 1320.0)
+}
+
+/// A rubber cord of 1 cm; 1 m of it is released.
+pub fn rubber() -> Rod {
+    Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0)
+}
+
 /// A base at rest in the origin, no load, no gravity.
 pub fn clamped(rotation: Matrix3<f64>) -> Boundary {
     let zero = Vector3::zeros();
@@ -123,6 +135,18 @@ pub fn clamped(rotation: Matrix3<f64>) -> Boundary {
 pub fn unstressed(mesh: Mesh, rod: Rod, boundary: &Boundary) -> Stepper {
     let state = State::at_rest_shape(&mesh, &boundary.base);
     Stepper::new(mesh, rod, state)
+}
+
+/// The same, set to be stepped by the pose formulation.
+pub fn by_poses(mesh: Mesh, rod: Rod, boundary: &Boundary) -> Stepper {
+    let mut stepper = unstressed(mesh, rod, boundary);
+    stepper.start(boundary).expect("accelerations at the start");
+    stepper
+}
+
+/// The same by the rate formulation.
+pub fn by_rates(mesh: Mesh, rod: Rod, boundary: &Boundary, options: Options) -> rate::Stepper {
+    rate::Stepper::new(mesh, rod, boundary, options).expect("no shear, stretch, damping or body at the tip")
 }
 
 /// Angle of the tangent in the x-y plane, counted from +x; unwound by the caller where it may pass π.
