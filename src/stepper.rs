@@ -83,7 +83,7 @@ pub enum Reason {
     TooManyIterations,
     /// The linearised equations have no unique solution.
     Singular(Singular),
-    /// A number overflowed, or was given as none.
+    /// A number overflowed, or one that was given is not finite.
     NotFinite,
     /// The formulation clamps the base, which is to hold this only.
     BaseLetGo(Held),
