@@ -23,7 +23,6 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::modes::modes;
 use cosserat_rod::rod::Rod;
 use indicatif::ProgressBar;
-use nalgebra::Matrix3;
 use plotters::style::text_anchor::HPos;
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
@@ -42,10 +41,6 @@ const SPEED: f64 = 0.05;
 const DURATION: f64 = 4.5;
 /// A clamp whose section may turn about the axis.
 const TURNING: Held = Held { translation: [true; 3], rotation: [true, true, false] };
-
-fn along_x() -> Matrix3<f64> {
-    Matrix3::from_columns(&[-Vec3::z(), Vec3::y(), Vec3::x()])
-}
 
 fn rod() -> Rod {
     scene::rubber(RADIUS, YOUNG)
@@ -66,15 +61,15 @@ fn boundary(unloaded: Vec3, time: f64) -> Boundary {
         tip: Support {
             velocity: -Vec3::x() * speed,
             held: TURNING,
-            ..Support::at_rest(unloaded - Vec3::x() * approach, along_x())
+            ..Support::at_rest(unloaded - Vec3::x() * approach, scene::along_x())
         },
         tip_moment: Vec3::x() * torque,
-        ..Boundary::hanging_from(Support::at_rest(Vec3::zeros(), along_x()), Vec3::zeros())
+        ..Boundary::hanging_from(Support::at_rest(Vec3::zeros(), scene::along_x()), Vec3::zeros())
     }
 }
 
 fn scene(scheme: Scheme) -> Scene {
-    let base = Support::at_rest(Vec3::zeros(), along_x());
+    let base = Support::at_rest(Vec3::zeros(), scene::along_x());
     let unloaded = cosserat_rod::pose::State::at_rest_shape(&mesh(), &base).tip().position;
     Scene {
         rod: rod(),
@@ -105,13 +100,13 @@ fn closed_form(torque: f64) -> f64 {
 
 /// The same, where the first mode of the straight rod comes to rest.
 fn by_modes(torque: f64) -> Result<f64, Box<dyn Error>> {
-    let (rod, base) = (rod(), Support::at_rest(Vec3::zeros(), along_x()));
+    let (rod, base) = (rod(), Support::at_rest(Vec3::zeros(), scene::along_x()));
     let stiffness = rod.stiffness.x;
     let straight = Mesh::uniform(LENGTH, SEGMENTS, 1, Vec3::zeros());
     let sliding = Held { translation: [true, true, false], ..TURNING };
     let omega_squared = |load: f64| -> Result<f64, Box<dyn Error>> {
         let boundary = Boundary {
-            tip: Support { held: sliding, ..Support::at_rest(Vec3::x() * LENGTH, along_x()) },
+            tip: Support { held: sliding, ..Support::at_rest(Vec3::x() * LENGTH, scene::along_x()) },
             tip_force: -Vec3::x() * (load * stiffness / (LENGTH * LENGTH)),
             tip_moment: Vec3::x() * (torque * stiffness / LENGTH),
             ..Boundary::hanging_from(base, Vec3::zeros())
@@ -165,7 +160,7 @@ fn writhe(frame: &Frame) -> f64 {
 fn link(run: &Run) -> Vec<(f64, f64)> {
     let mut turns = 0.0;
     run.curve(|frame| {
-        let section = along_x().tr_mul(&frame.rotations[frame.rotations.len() - 1]);
+        let section = scene::along_x().tr_mul(&frame.rotations[frame.rotations.len() - 1]);
         section[(1, 0)].atan2(section[(0, 0)]) / TAU
     })
     .into_iter()
@@ -240,7 +235,7 @@ pub fn run(bar: &ProgressBar) -> Result<Example, Box<dyn Error>> {
             })
             .collect();
         let clamps: Vec<_> = [shown.at(0.0).centreline[0], shown.at(0.0).tip(), shown.at(DURATION).tip()]
-            .map(|r| (r, along_x(), 0.02))
+            .map(|r| (r, scene::along_x(), 0.02))
             .to_vec();
         let eye = Eye { azimuth: -70.0, elevation: 22.0 };
         draw::space(&above, &Space { eye, strands: &strands, clamps: &clamps, ways: &[], floor: Some((0.03, 0.05)) })?;

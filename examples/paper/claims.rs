@@ -235,8 +235,7 @@ fn median_cost(
 }
 
 fn costs(rows: &mut Vec<Vec<String>>) -> Result<(), Box<dyn Error>> {
-    let along_x = Matrix3::from_columns(&[-Vec3::z(), Vec3::y(), Vec3::x()]);
-    let boundary = Boundary::hanging_from(Support::at_rest(Vec3::zeros(), along_x), -Vec3::z() * GRAVITY);
+    let boundary = scene::horizontal();
     for (material, rod, length) in
         [("hair", scene::keratin(), 0.25), ("rubber", rod(), 1.0), ("steel", scene::steel(1e-3), 1.0)]
     {
@@ -264,7 +263,7 @@ fn costs(rows: &mut Vec<Vec<String>>) -> Result<(), Box<dyn Error>> {
         row("pose", implicit);
 
         // the initial value problem: explicit steps of the same cells, as long as they may be
-        let compliant = Rod { compliance: compliance(&rod), ..rod.clone() };
+        let compliant = scene::compliant(&rod);
         let dt = explicit::longest_step(&compliant, length / SEGMENTS as f64);
         let begin = || -> Result<Box<dyn Formulation>, Box<dyn Error>> {
             Ok(Box::new(Explicit::new(&mesh, &compliant, &boundary)))
@@ -279,13 +278,6 @@ fn costs(rows: &mut Vec<Vec<String>>) -> Result<(), Box<dyn Error>> {
         rows.push(vec![format!("{material}, the same cells, explicit"), value]);
     }
     Ok(())
-}
-
-/// 1/GA, 1/GA, 1/EA of a round section, from K = (EI, EI, 2GI) and ρI/ρA = I/A.
-fn compliance(rod: &Rod) -> Vec3 {
-    let gyration = rod.inertia_per_length.x / rod.mass_per_length;
-    let (stretch, shear) = (gyration / rod.stiffness.x, 2.0 * gyration / rod.stiffness.z);
-    Vec3::new(shear, shear, stretch)
 }
 
 /// Decay per step of the first mode of a steel cantilever, measured and by the spectral radius at ωΔt.
@@ -341,8 +333,7 @@ fn length_error(rod: &rate::Stepper, h: f64) -> f64 {
 
 /// [`length_error`] over time, rubber released from the horizontal.
 fn lengths(rows: &mut Vec<Vec<String>>) -> Result<(), Box<dyn Error>> {
-    let along_x = Matrix3::from_columns(&[-Vec3::z(), Vec3::y(), Vec3::x()]);
-    let boundary = Boundary::hanging_from(Support::at_rest(Vec3::zeros(), along_x), -Vec3::z() * GRAVITY);
+    let boundary = scene::horizontal();
     let mesh = Mesh::uniform(LENGTH, SEGMENTS, 1, Vec3::zeros());
     for dt in [DT, 1e-2, 1e-3] {
         for (name, options) in [("as printed", Options::AS_PRINTED), ("mended", Options::MENDED)] {
@@ -434,7 +425,7 @@ mod tests {
         let (radius, youngs, shear) = (2e-3, 206e9, 79.3e9);
         let area = 0.5 * TAU * radius * radius;
         let exact = Vec3::new(1.0 / (shear * area), 1.0 / (shear * area), 1.0 / (youngs * area));
-        assert!((compliance(&scene::steel(radius)) - exact).norm() < 1e-12 * exact.norm());
+        assert!((scene::compliant(&scene::steel(radius)).compliance - exact).norm() < 1e-12 * exact.norm());
     }
 
     #[test]

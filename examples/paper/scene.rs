@@ -199,7 +199,7 @@ pub const PLAIN: Method = Method {
     begin: |scene| {
         let mut stepper = scene.rod_at_start()?;
         stepper.start(&(scene.boundary)(0.0))?;
-        Ok(Box::new(Plain(stepper)))
+        Ok(Box::new(ByRow { stepper, row: Row::Rotations }))
     },
 };
 
@@ -269,23 +269,27 @@ pub fn curves(cases: &[Case], runs: &[Run], number: impl Fn(&Frame) -> f64) -> V
     cases.iter().zip(runs).filter_map(curve).collect()
 }
 
-struct Plain(Stepper);
+/// The pose formulation with one of its acceleration rows, whatever comes.
+pub struct ByRow {
+    pub stepper: Stepper,
+    pub row: Row,
+}
 
-impl Formulation for Plain {
+impl Formulation for ByRow {
     fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64) -> Result<Report, Diverged> {
-        self.0.step(boundary, scheme, dt, Row::Rotations)
+        self.stepper.step(boundary, scheme, dt, self.row)
     }
 
     fn nodes(&self) -> usize {
-        self.0.nodes()
+        self.stepper.nodes()
     }
 
     fn section(&self, j: usize) -> Section {
-        self.0.section(j)
+        self.stepper.section(j)
     }
 
     fn energy(&self, gravity: &Vec3) -> Energy {
-        Formulation::energy(&self.0, gravity)
+        Formulation::energy(&self.stepper, gravity)
     }
 }
 
@@ -341,6 +345,24 @@ impl Helix {
         let rotation = Matrix3::from_columns(&[-out, tangent.cross(&-out), tangent]);
         Support::at_rest(out * self.radius, rotation)
     }
+}
+
+/// R(0) of a rod that leaves its base along +x, d₂ along +y.
+pub fn along_x() -> Matrix3<f64> {
+    Matrix3::from_columns(&[-Vec3::z(), Vec3::y(), Vec3::x()])
+}
+
+/// Clamped along x, free at the tip, under gravity.
+pub fn horizontal() -> Boundary {
+    Boundary::hanging_from(Support::at_rest(Vec3::zeros(), along_x()), -Vec3::z() * GRAVITY)
+}
+
+/// The same rod with the compliances of its round section to shear and stretch, 1/GA, 1/GA, 1/EA: from K = (EI, EI, 2GI)
+/// and ρI/ρA = I/A.
+pub fn compliant(rod: &Rod) -> Rod {
+    let gyration = rod.inertia_per_length.x / rod.mass_per_length;
+    let (stretch, shear) = (gyration / rod.stiffness.x, 2.0 * gyration / rod.stiffness.z);
+    Rod { compliance: Vec3::new(shear, shear, stretch), ..rod.clone() }
 }
 
 /// Soft rubber, for what the paper leaves open: thick enough to be seen moving.

@@ -48,8 +48,7 @@ fn scene(scheme: Scheme, finer: usize) -> Scene {
     let dt = DT / finer as f64;
     let rod = scene::rubber(RADIUS, YOUNG);
     let torque = axis() * (TURN * rod.stiffness[0] / LENGTH);
-    let along_x = Matrix3::from_columns(&[-Vec3::z(), Vec3::y(), Vec3::x()]);
-    let base = Support::at_rest(Vec3::zeros(), along_x);
+    let base = Support::at_rest(Vec3::zeros(), scene::along_x());
     let boundary =
         move |time: f64| Boundary { tip_moment: torque * part(time), ..Boundary::hanging_from(base, Vec3::zeros()) };
     Scene {

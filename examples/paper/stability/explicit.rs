@@ -172,12 +172,13 @@ impl Formulation for Explicit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stability::scan::{self, MATERIALS, Material};
+    use crate::scene;
+    use crate::stability::scan::{MATERIALS, Material};
 
     /// What the rod has gained after 400 steps of `part` of the longest, in units of what it can gain by falling;
     /// infinite where a number overflows.
     fn gain(material: &Material, cells: usize, part: f64) -> f64 {
-        let (rod, boundary) = (material.compliant_rod(), scan::boundary());
+        let (rod, boundary) = (scene::compliant(&material.rod()), scene::horizontal());
         let mut explicit = Explicit::new(&material.mesh(cells), &rod, &boundary);
         let total = |explicit: &Explicit| explicit.energy(&boundary.gravity).total();
         let start = total(&explicit);
@@ -208,7 +209,7 @@ mod tests {
         // below its longest step the energy of the leap swings about that of the rod, by the square of the step
         let material = &MATERIALS[1];
         let [coarse, fine] = [0.5, 0.25].map(|part| {
-            let (rod, boundary) = (material.compliant_rod(), scan::boundary());
+            let (rod, boundary) = (scene::compliant(&material.rod()), scene::horizontal());
             let mut explicit = Explicit::new(&material.mesh(6), &rod, &boundary);
             let start = explicit.energy(&boundary.gravity).total();
             let dt = part * longest_step(&rod, material.length / 6.0);

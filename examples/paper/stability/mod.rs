@@ -18,17 +18,14 @@ mod scan;
 mod shooting;
 
 use crate::report::{Example, Numbers};
-use crate::scene::PAPER;
+use crate::scene::{self, ByRow, PAPER};
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::Boundary;
-use cosserat_rod::energy::Energy;
 use cosserat_rod::formulation::Formulation;
-use cosserat_rod::pose::{Row, Section, State};
+use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rate::{self, Options};
-use cosserat_rod::stepper::{Diverged, Report, Stepper};
+use cosserat_rod::stepper::Stepper;
 use explicit::Explicit;
 use indicatif::ProgressBar;
-use nalgebra::Vector3;
 use scan::{MATERIALS, Outcome, Reference, Verdict};
 use shooting::Shooting;
 use std::error::Error;
@@ -99,7 +96,7 @@ impl Method {
     /// The unstressed rod at rest.
     fn begin(&self, case: &Case) -> Result<Box<dyn Formulation>, Lost> {
         let material = &MATERIALS[case.material];
-        let boundary = scan::boundary();
+        let boundary = scene::horizontal();
         let mesh = material.mesh(CELLS[case.cells]);
         let by_rates = |options: Options| rate::Stepper::new(mesh.clone(), material.rod(), &boundary, options);
         let by_poses = || {
@@ -114,32 +111,8 @@ impl Method {
             Self::PoseByPositions => Box::new(ByRow { stepper: by_poses()?, row: Row::Positions }),
             Self::Pose => Box::new(by_poses()?),
             Self::Shooting => Box::new(Shooting::new(by_rates(Options::MENDED)?)),
-            Self::Explicit => Box::new(Explicit::new(&mesh, &material.compliant_rod(), &boundary)),
+            Self::Explicit => Box::new(Explicit::new(&mesh, &scene::compliant(&material.rod()), &boundary)),
         })
-    }
-}
-
-/// The pose formulation with one of its acceleration rows, whatever comes.
-struct ByRow {
-    stepper: Stepper,
-    row: Row,
-}
-
-impl Formulation for ByRow {
-    fn step(&mut self, boundary: &Boundary, scheme: Scheme, dt: f64) -> Result<Report, Diverged> {
-        self.stepper.step(boundary, scheme, dt, self.row)
-    }
-
-    fn nodes(&self) -> usize {
-        self.stepper.nodes()
-    }
-
-    fn section(&self, j: usize) -> Section {
-        self.stepper.section(j)
-    }
-
-    fn energy(&self, gravity: &Vector3<f64>) -> Energy {
-        Formulation::energy(&self.stepper, gravity)
     }
 }
 
@@ -198,7 +171,9 @@ impl Case {
 fn limits(method: Method, scheme: usize, material: usize, cells: usize) -> Vec<f64> {
     let (material, cells) = (&MATERIALS[material], CELLS[cells]);
     match method {
-        Method::Explicit => vec![explicit::longest_step(&material.compliant_rod(), material.length / cells as f64)],
+        Method::Explicit => {
+            vec![explicit::longest_step(&scene::compliant(&material.rod()), material.length / cells as f64)]
+        }
         Method::Shooting => shooting::limits(&material.rod(), material.length, cells, &SCHEMES[scheme].1),
         _ => Vec::new(),
     }

@@ -1,14 +1,13 @@
 //! One rod, released from the horizontal, by one method: what became of it.
 
+use crate::scene::{self, GRAVITY};
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::formulation::Formulation;
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::State;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
-use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::PI;
+use nalgebra::Vector3;
 
 /// Steps of a run.
 pub const STEPS: usize = 200;
@@ -52,13 +51,6 @@ impl Material {
         Rod::circular(self.radius, self.moduli.0, self.moduli.1, self.density)
     }
 
-    /// The rod with the compliances of its section to shear and stretch.
-    pub fn compliant_rod(&self) -> Rod {
-        let area = PI * self.radius.powi(2);
-        let (stretch, shear) = (1.0 / (self.moduli.0 * area), 1.0 / (self.moduli.1 * area));
-        Rod { compliance: Vector3::new(shear, shear, stretch), ..self.rod() }
-    }
-
     pub fn mesh(&self, cells: usize) -> Mesh {
         Mesh::uniform(self.length, cells, 1, Vector3::zeros())
     }
@@ -67,15 +59,6 @@ impl Material {
     pub fn weight(&self) -> f64 {
         self.rod().mass_per_length * self.length * GRAVITY
     }
-}
-
-/// g, m/s².
-pub const GRAVITY: f64 = 9.81;
-
-/// Clamped along x, free at the tip.
-pub fn boundary() -> Boundary {
-    let along_x = Matrix3::from_columns(&[-Vector3::z(), Vector3::y(), Vector3::x()]);
-    Boundary::hanging_from(Support::at_rest(Vector3::zeros(), along_x), Vector3::z() * -GRAVITY)
 }
 
 /// The motion that all are compared with, and the rod at rest.
@@ -87,7 +70,7 @@ pub struct Reference {
 impl Reference {
     /// By the pose formulation on 10 cells of 4 stages, whose error is far below what the map shows.
     pub fn new(material: &Material) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
-        let boundary = boundary();
+        let boundary = scene::horizontal();
         let mesh = Mesh::uniform(material.length, 10, 4, Vector3::zeros());
         let state = State::at_rest_shape(&mesh, &boundary.base);
         let mut hanging = Stepper::new(mesh, material.rod(), state);
@@ -159,7 +142,7 @@ pub struct Outcome {
 
 /// Runs a rod.
 pub fn run(material: &Material, reference: &Reference, rod: &mut dyn Formulation, scheme: Scheme, dt: f64) -> Outcome {
-    let boundary = boundary();
+    let boundary = scene::horizontal();
     let (length, weight) = (material.length, material.weight());
     let h = length / (rod.nodes() - 1) as f64;
     let start = rod.energy(&boundary.gravity).total();
@@ -224,6 +207,7 @@ fn alternation(series: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cosserat_rod::boundary::Boundary;
     use cosserat_rod::energy::Energy;
     use cosserat_rod::pose::Section;
     use cosserat_rod::stepper::{Diverged, Reason, Report, Termination};

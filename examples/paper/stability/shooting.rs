@@ -8,7 +8,7 @@
 //! e³⁶ = 1/ε nothing of the guess is left at the tip. Newton on the guess ends before: measured, from about e¹² on.
 //! Long rods, thin rods and small steps are the bad ones; at very small ones the box no longer follows what grows.
 
-use super::scan::GRAVITY;
+use crate::scene::GRAVITY;
 use cosserat_rod::alpha::Scheme;
 use cosserat_rod::boundary::Boundary;
 use cosserat_rod::energy::Energy;
@@ -200,14 +200,15 @@ impl Formulation for Shooting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stability::scan::{self, MATERIALS};
+    use crate::scene;
+    use crate::stability::scan::MATERIALS;
     use cosserat_rod::rate::Options;
 
     const SCHEME: Scheme = Scheme::BACKWARD_EULER;
 
     fn steel(cells: usize) -> Stepper {
         let material = &MATERIALS[2];
-        Stepper::new(material.mesh(cells), material.rod(), &scan::boundary(), Options::MENDED).unwrap()
+        Stepper::new(material.mesh(cells), material.rod(), &scene::horizontal(), Options::MENDED).unwrap()
     }
 
     /// ln of what 100 cells of steel grow by in a step of `dt`.
@@ -218,7 +219,7 @@ mod tests {
 
     #[test]
     fn the_first_step_is_by_relaxation_and_those_after_it_have_its_solution() {
-        let boundary = scan::boundary();
+        let boundary = scene::horizontal();
         let (mut relaxed, mut shot) = (steel(25), Shooting::new(steel(25)));
         for step in 0..50 {
             relaxed.step(&boundary, SCHEME, 1e-2).unwrap();
@@ -239,7 +240,7 @@ mod tests {
 
     #[test]
     fn the_growth_of_the_march_says_where_it_is_lost() {
-        let boundary = scan::boundary();
+        let boundary = scene::horizontal();
         let steps = |dt: f64| {
             let mut shot = Shooting::new(steel(100));
             (0..20).take_while(|_| shot.step(&boundary, SCHEME, dt).is_ok()).count()
