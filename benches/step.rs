@@ -17,7 +17,7 @@ use cosserat_rod::alpha::Scheme;
 use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::fmi2::host::Fmu;
 use cosserat_rod::fmi2::variables::Kind;
-use cosserat_rod::mesh::Mesh;
+use cosserat_rod::mesh::{Gauss, Mesh};
 use cosserat_rod::package;
 use cosserat_rod::pose::{Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
@@ -25,7 +25,7 @@ use cosserat_rod::so3;
 use cosserat_rod::sweep::{Sweep, System};
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use full::Full;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
@@ -35,7 +35,7 @@ const STAGES: [usize; 2] = [1, 4];
 const DT: f64 = 5e-3;
 
 /// The parts of an iteration.
-const PHASES: [&str; 4] = ["assembly", "elimination", "substitution", "update"];
+const PHASES: [&str; 4] = ["assembly", "factors", "solution", "update"];
 
 /// A rod in the middle of a step, ready for any phase any number of times.
 struct Iteration {
@@ -77,8 +77,8 @@ impl Iteration {
             "assembly" => {
                 assemble(mesh, rod, old, trial, boundary, time, system);
             }
-            "elimination" => sweep.eliminate(system).expect("the rod's cells are regular"),
-            "substitution" => sweep.substitute(system),
+            "factors" => sweep.factorise(system).expect("the rod's cells are regular"),
+            "solution" => sweep.solve_for(&system.residuals),
             // a vanishing part of the increment: the same work, and the state stays
             _ => trial.apply(&sweep.nodes, &sweep.points, 1e-12, Row::Rotations),
         }
@@ -99,18 +99,60 @@ impl Iteration {
     }
 }
 
+/// A linear system of no rod in particular, and its sweep.
+struct Linear<const V: usize, const S: usize> {
+    system: System<V, S>,
+    sweep: Sweep<V, S>,
+}
+
+impl<const V: usize, const S: usize> Linear<V, S> {
+    fn new(cells: usize, stages: usize, extensible: bool) -> Self {
+        let rule = Gauss::new(stages);
+        let mut system = System::<V, S>::new(cells, &rule, extensible);
+        system.mass = 1.0;
+        for (i, point) in system.points.iter_mut().enumerate() {
+            let angle = 0.1 * i as f64;
+            point.spin = SMatrix::from_fn(|i, j| f64::from(i == j) + 0.1 * (angle + (2 * i + j) as f64).sin());
+            point.w_phi = SMatrix::from_fn(|i, j| (angle + (3 * i + j) as f64).sin());
+            point.w_n = SMatrix::identity() * 1e-3;
+            point.m_phi = SMatrix::identity() * 1e-2;
+            point.m_n = point.w_phi.transpose();
+            (point.p_strain, point.law_strain) = (point.spin.transpose() * point.spin, point.spin);
+        }
+        for ends in &mut system.cells {
+            (ends.length, ends.spin) = (1.0 / cells as f64, SMatrix::identity());
+        }
+        system.residuals.base.0.fill(1.0);
+        system.residuals.tip_load.0.fill(1.0);
+        Self { sweep: Sweep::new(cells, &rule, extensible), system }
+    }
+
+    /// Runs one part so many times.
+    fn count(&mut self, part: &str, times: usize) {
+        let Self { system, sweep } = self;
+        for _ in 0..times {
+            match part {
+                "factors" => sweep.factorise(system).expect("regular cells"),
+                _ => sweep.solve_for(&system.residuals),
+            }
+            black_box(&mut *sweep);
+        }
+    }
+}
+
 fn median(mut samples: Vec<f64>) -> f64 {
     samples.sort_by(f64::total_cmp);
     samples[samples.len() / 2]
 }
 
 /// Instructions of this program under callgrind with so many iterations.
-fn counted(cells: usize, stages: usize, iterations: usize) -> Option<f64> {
+fn counted(cells: usize, stages: usize, iterations: usize, part: &str, of: &str) -> Option<f64> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(std::env::current_exe().ok()?)
         .arg("--count")
         .args([cells, stages, iterations].map(|number| number.to_string()))
+        .args([part, of])
         .output()
         .ok()?;
     // "==1== Collected : 123"
@@ -119,14 +161,20 @@ fn counted(cells: usize, stages: usize, iterations: usize) -> Option<f64> {
     line.rsplit(' ').next()?.parse().ok()
 }
 
-/// Instructions of one iteration.
-fn instructions(cells: usize, stages: usize) -> Option<f64> {
-    Some(counted(cells, stages, 2)? - counted(cells, stages, 1)?)
+/// Instructions of one run.
+fn instructions(cells: usize, stages: usize, part: &str, of: &str) -> Option<f64> {
+    Some(counted(cells, stages, 2, part, of)? - counted(cells, stages, 1, part, of)?)
+}
+
+/// Instructions of a further cell.
+fn of_further_cell(stages: usize, part: &str, of: &str) -> Option<f64> {
+    let (few, many) = (10, 30);
+    Some((instructions(many, stages, part, of)? - instructions(few, stages, part, of)?) / (many - few) as f64)
 }
 
 /// Seconds of the sweep and of the banded LU, factors and solution, on the same system.
 fn sweep_and_lu(iteration: &mut Iteration, cells: usize) -> (f64, f64) {
-    let sweep = iteration.seconds("elimination", cells) + iteration.seconds("substitution", cells);
+    let sweep = iteration.seconds("factors", cells) + iteration.seconds("solution", cells);
     let full = Full::new(&iteration.system, &iteration.mesh.rule);
     let right = flat(&full.right);
     let sample = |_| {
@@ -198,9 +246,21 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(at) = arguments.iter().position(|argument| argument == "--count") {
         let number = |i: usize| arguments[at + i].parse().expect("a number");
-        let mut iteration = Iteration::new(number(1), number(2));
-        for _ in 0..number(3) {
-            PHASES.iter().for_each(|phase| iteration.run(phase));
+        let (cells, stages, times) = (number(1), number(2), number(3));
+        let part = arguments[at + 4].as_str();
+        match arguments[at + 5].as_str() {
+            "plane" => Linear::<2, 1>::new(cells, stages, false).count(part, times),
+            "space" => Linear::<3, 3>::new(cells, stages, false).count(part, times),
+            "extensible" => Linear::<3, 3>::new(cells, stages, true).count(part, times),
+            _ => {
+                let mut iteration = Iteration::new(cells, stages);
+                for _ in 0..times {
+                    PHASES
+                        .iter()
+                        .filter(|phase| part == "all" || part == **phase)
+                        .for_each(|phase| iteration.run(phase));
+                }
+            }
         }
         return;
     }
@@ -222,13 +282,29 @@ fn main() {
             let total: f64 = times.iter().sum();
             let shares = times.map(|time| format!("{:>12.0} %", 100.0 * time / total)).concat();
 
-            let work = instructions(cells, stages);
+            let work = instructions(cells, stages, "all", "rod");
             let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1}"));
             let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
             before = work.map(|work| (cells, work));
             let per_cell = show(work.map(|work| work / cells as f64));
             println!("{cells:>6} {per_cell:>14} {:>14} {:>9.0}{shares}", show(further), total * 1e9);
         }
+    }
+
+    println!("\nInstructions of a further cell");
+    println!("{:>20} {:>8} {:>8} {:>8} {:>8}", "stages", 1, 2, 3, 4);
+    for (of, part) in [
+        ("rod", "assembly"),
+        ("space", "factors"),
+        ("space", "solution"),
+        ("extensible", "factors"),
+        ("extensible", "solution"),
+        ("plane", "factors"),
+        ("plane", "solution"),
+    ] {
+        let count = |stages| of_further_cell(stages, part, of).map_or("-".to_string(), |count| format!("{count:.0}"));
+        let counts = [1, 2, 3, 4].map(|stages| format!(" {:>8}", count(stages))).concat();
+        println!("{of:>11} {part:>8}{counts}");
     }
 
     println!("\nSweep and banded LU with partial pivoting on the same systems, µs");

@@ -153,8 +153,8 @@ fn subtract(x: &mut Field, y: &Field, factor: f64) {
 
 /// K⁻¹ M y, and the displacement of the nodes that goes with it.
 fn apply(stepper: &mut Stepper, boundary: &Boundary, y: &Field) -> Result<(Field, Vec<Vector3<f64>>), Diverged> {
-    let (nodes, points) = stepper.linear_statics(boundary, |mesh, rod, state, system| {
-        pose::load_with_inertia(mesh, rod, state, y, system);
+    let (nodes, points) = stepper.linear_statics(boundary, |mesh, rod, state, residuals| {
+        pose::load_with_inertia(mesh, rod, state, y, residuals);
     })?;
     let pair = |delta: &Increment| (delta.w, delta.phi);
     let tip = &nodes[nodes.len() - 1];

@@ -11,6 +11,18 @@
 //! ω and ω_t at a Gauss point follow from its new rotation and its history through the time scheme. All of r or a, R, n
 //! and m are iterated ('lifted'), so that Newton sees the equations as they stand here and not their composition.
 //!
+//! Within a cell that begins with R₀ it is Φ = log(R₀ᵀR) that is collocated, Φ_s = J_r⁻¹(Φ) κ = g, and with it not m
+//! but what does work on it, the canonical moment p:
+//!
+//! ```text
+//! p = Tᵀ m,  T = R J_r(Φ)           p_s = Tᵀ m_s + Dᵀ Rᵀm,  D = ∂(J_r(Φ) g)/∂Φ
+//! ```
+//!
+//! For smooth solutions this is eq 6 again; m itself is balanced over whole cells. Collocated by a Gauss rule the two
+//! are what the virtual power of the cells' strains yields: the rod of the cells is conservative, and its stiffness
+//! about an equilibrium symmetric. With m collocated in the world frame it is not, and a rod bent out of a plane
+//! flutters: its fastest waves grow by themselves, however small the step.
+//!
 //! The acceleration has two rows. [`Row::Rotations`] is the one above: the section rotations are then the only
 //! variables with a history and the rod is an ordinary differential equation. [`Row::Positions`] takes a from the
 //! history of r instead; it is the row of the extensible rod, and for the inextensible one the more forgiving of the
@@ -33,7 +45,7 @@ use crate::boundary::{Boundary, Held, Support};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::rod::Rod;
 use crate::so3;
-use crate::sweep::{CellEnds, Increment, Joint, Point, Relation, Sweep, System};
+use crate::sweep::{CellEnds, Increment, Joint, Point, Relation, Residuals, Sweep, System};
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
@@ -83,6 +95,20 @@ pub struct Memory {
     pub kappa: Vec3,
     /// κ_t, κ_tt, body frame.
     pub strain: Motion,
+    /// What a stage of a Runge-Kutta step knows beforehand.
+    pub known: Known,
+}
+
+/// The parts of a stage's coordinates that the stages before it give: θ of the rotation exp(θ) since the beginning of
+/// the step, θ_t, and κ; body frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Known {
+    /// Of θ, rad.
+    pub theta: Vec3,
+    /// Of θ_t, rad/s.
+    pub rate: Vec3,
+    /// Of κ, 1/m.
+    pub kappa: Vec3,
 }
 
 /// A rod at one instant, with its history.
@@ -127,6 +153,12 @@ pub enum Time {
         /// The acceleration row.
         row: Row,
     },
+    /// A stage of a Runge-Kutta step, in coordinates θ of the rotations since its beginning:
+    /// θ_t = w (θ − known), θ_tt = w (θ_t − known), κ_t = w (κ − known).
+    Stage {
+        /// w, 1/s.
+        weight: f64,
+    },
 }
 
 impl Time {
@@ -138,6 +170,7 @@ impl Time {
                 let weight = scheme.rate_weight(*dt);
                 (weight, weight * weight)
             }
+            Self::Stage { weight } => (*weight, weight * weight),
         }
     }
 
@@ -146,6 +179,7 @@ impl Time {
         match self {
             Self::Static => Row::Positions,
             Self::Step { row, .. } => *row,
+            Self::Stage { .. } => Row::Rotations,
         }
     }
 
@@ -153,6 +187,40 @@ impl Time {
         match self {
             Self::Static => Motion::default(),
             Self::Step { scheme, dt, .. } => scheme.motion(old, increment, *dt),
+            Self::Stage { .. } => Motion::default(),
+        }
+    }
+
+    /// ω and ω_t of a section that has turned by `theta`.
+    fn spin(&self, old: &Memory, theta: &Vec3) -> Motion {
+        match self {
+            Self::Stage { weight } => {
+                let rate = (theta - old.known.theta) * *weight;
+                let rate_t = (rate - old.known.rate) * *weight;
+                let (omega, drift) = so3::right_jacobian_rate(theta, &rate, &rate);
+                Motion::starting(omega, so3::right_jacobian(theta) * rate_t + drift, Vec3::zeros())
+            }
+            _ => self.motion(&old.spin, theta),
+        }
+    }
+
+    /// ω and ω_t as [`Self::spin`], with their derivatives by `theta`; in a stage but for terms of the order of θ ω w in
+    /// that of ω_t, small beside w².
+    fn spin_with_derivatives(&self, old: &Memory, theta: &Vec3) -> (Motion, Mat3, Mat3) {
+        let spin = self.spin(old, theta);
+        match self {
+            Self::Stage { weight } => {
+                let rate = (theta - old.known.theta) * *weight;
+                let rate_t = (rate - old.known.rate) * *weight;
+                let J = so3::right_jacobian(theta);
+                let by_theta = J * *weight + so3::right_jacobian_derivative(theta, &rate);
+                let t_by_theta = J * (weight * weight) + so3::right_jacobian_derivative(theta, &rate_t);
+                (spin, by_theta, t_by_theta)
+            }
+            _ => {
+                let (v, a) = self.weights();
+                (spin, Mat3::from_diagonal_element(v), Mat3::from_diagonal_element(a))
+            }
         }
     }
 
@@ -164,6 +232,7 @@ impl Time {
                 let weight = scheme.rate_weight(*dt);
                 (weight, scheme.rate(&old.strain.velocity, &Vec3::zeros(), *dt).value - old.kappa * weight)
             }
+            Self::Stage { weight } => (*weight, -old.known.kappa * *weight),
         }
     }
 }
@@ -240,7 +309,7 @@ impl State {
             let vectors = [position, turn, force, moment, acceleration];
             vectors.into_iter().all(finite) && rotation.iter().all(|x| x.is_finite())
         };
-        let memory = |Memory { spin, travel, kappa, strain }: &Memory| {
+        let memory = |Memory { spin, travel, kappa, strain, known: _ }: &Memory| {
             finite(kappa) && [spin, travel, strain].into_iter().all(Motion::is_finite)
         };
         let sections = self.nodes.iter().chain(&self.points).all(section);
@@ -253,7 +322,7 @@ impl State {
     }
 
     /// The section that the history `i` belongs to.
-    fn remembering(&self, i: usize) -> &Section {
+    pub(crate) fn remembering(&self, i: usize) -> &Section {
         self.points.get(i).unwrap_or(self.tip())
     }
 
@@ -325,6 +394,25 @@ impl State {
         }
     }
 
+    /// The rotations of the nodes that belong to those of the points.
+    pub(crate) fn carry_nodes(&mut self, mesh: &Mesh, base: &Mat3) {
+        let Gauss { stages, b, a_inverse, .. } = &mesh.rule;
+        self.nodes[0].rotation = *base;
+        for j in 0..mesh.cells.len() {
+            let R_0 = self.nodes[j].rotation;
+            let mut phi = [Vec3::zeros(); MAX_STAGES];
+            for k in 0..*stages {
+                let point = &self.points[j * stages + k];
+                phi[k] = so3::log_near(&R_0.tr_mul(&point.rotation), &point.turn);
+            }
+            let mut turn = Vec3::zeros();
+            for k in 0..*stages {
+                turn += integral(Vec3::zeros(), b[k], &a_inverse[k], &phi, *stages);
+            }
+            self.nodes[j + 1].rotation = R_0 * so3::exp(&turn);
+        }
+    }
+
     /// Copies without allocating.
     pub fn copy_from(&mut self, other: &Self) {
         self.nodes.copy_from_slice(&other.nodes);
@@ -339,10 +427,15 @@ impl State {
     /// Applies μ times the increments of a sweep.
     pub fn apply(&mut self, nodes: &[Increment], points: &[Increment], mu: f64, row: Row) {
         let sections = self.nodes.iter_mut().zip(nodes).chain(self.points.iter_mut().zip(points));
-        for (section, delta) in sections {
-            section.rotation = so3::exp(&(delta.phi * mu)) * section.rotation;
-            section.force += delta.n * mu;
-            section.moment += delta.m * mu;
+        for (i, (section, delta)) in sections.enumerate() {
+            let turn = so3::exp(&(delta.phi * mu));
+            // in the axes of the section, as the law has the moment of a point: in the world frame the balance of p is
+            // less linear, which some steps in space pay for with an iteration more
+            let turned = |x: &Vec3| x.cross(&delta.phi);
+            let m = if i < nodes.len() { delta.m + turned(&section.moment) } else { section.rotation * delta.m };
+            section.force = turn * (section.force + (delta.n + turned(&section.force)) * mu);
+            section.moment = turn * (section.moment + m * mu);
+            section.rotation = turn * section.rotation;
             match row {
                 Row::Rotations => section.acceleration += delta.w * mu,
                 Row::Positions => section.position += delta.w * mu,
@@ -356,6 +449,8 @@ impl State {
         for (section, solved) in self.nodes.iter_mut().zip(nodes).chain(self.points.iter_mut().zip(points)) {
             section.acceleration = solved.w;
             section.force = solved.n;
+        }
+        for (section, solved) in self.nodes.iter_mut().zip(nodes) {
             section.moment = solved.m;
         }
         let tip = (&self.nodes[self.nodes.len() - 1], &end_of(rod, &self.boundary.tip.held, nodes, points));
@@ -394,17 +489,33 @@ impl State {
         let drag = rod.drag_rate();
         for i in 0..self.memory.len() {
             let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
-            self.memory[i].spin = time.motion(&old.memory[i].spin, &theta);
+            self.memory[i].spin = time.spin(&old.memory[i], &theta);
         }
         for (i, section) in self.points.iter().enumerate() {
             let cell = &mesh.cells[i / mesh.rule.stages];
             let (memory, past) = (&mut self.memory[i], &old.memory[i]);
             memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(section);
-            memory.strain = time.motion(&past.strain, &(memory.kappa - past.kappa));
+            memory.strain = match time {
+                Time::Stage { weight } => {
+                    Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
+                }
+                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
+            };
         }
         self.rebuild_positions(mesh, rod);
         match time {
             Time::Static => self.move_rigidly(),
+            Time::Stage { .. } => {
+                // as at a start: the true rates
+                self.dt = 0.0;
+                self.rebuild_accelerations(mesh, rod);
+                self.rebuild_velocities(mesh);
+                for i in 0..self.memory.len() {
+                    let u = self.memory[i].travel.velocity.value;
+                    let a = self.remembering(i).acceleration - u * drag;
+                    self.memory[i].travel = Motion::starting(u, a, Vec3::zeros());
+                }
+            }
             Time::Step { scheme, dt, row } => {
                 self.dt = *dt;
                 self.scheme = *scheme;
@@ -483,14 +594,14 @@ fn acceleration_slope(spin: &Motion, drag: f64) -> Vec3 {
 
 /// The law of bending and twist at a point, with the strain rate expressed by the strain:
 /// Rᵀm = K_eff (κ − κ_eff), K_eff = K (1 + τ ∂κ_t/∂κ).
-struct Law {
+pub(crate) struct Law {
     stiffness: Vec3,
     kappa_free: Vec3,
 }
 
 impl Law {
     #[inline]
-    fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
+    pub(crate) fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
         let (weight, offset) = time.strain_rate(old);
         let factor = rod.damping.map(|tau| 1.0 + tau * weight);
         let free = kappa_rest - rod.damping.component_mul(&offset);
@@ -498,7 +609,7 @@ impl Law {
     }
 
     #[inline]
-    fn kappa(&self, section: &Section) -> Vec3 {
+    pub(crate) fn kappa(&self, section: &Section) -> Vec3 {
         self.kappa_free + section.rotation.tr_mul(&section.moment).component_div(&self.stiffness)
     }
 }
@@ -540,6 +651,8 @@ pub fn assemble(
         let mut w_s = [Vec3::zeros(); MAX_STAGES];
         let mut n_s = [Vec3::zeros(); MAX_STAGES];
         let mut m_s = [Vec3::zeros(); MAX_STAGES];
+        let mut p = [Vec3::zeros(); MAX_STAGES];
+        let mut p_s = [Vec3::zeros(); MAX_STAGES];
 
         for k in 0..stages {
             let section = &state.points[first + k];
@@ -550,21 +663,29 @@ pub fn assemble(
             // R_s = R κ̂ as Φ_s = J_r⁻¹(Φ) κ, and the law
             let law = Law::new(rod, &cell.kappa_rest, time, past);
             let phi = so3::log_near(&node_0.rotation.tr_mul(R), &section.turn);
-            let (phi_s, phi_s_phi) = so3::rate_of_log(&phi, &law.kappa(section));
-            let J = so3::right_jacobian(&phi);
+            let map = so3::Tangent::new(&phi);
+            let phi_s = map.inverse_times(&law.kappa(section));
+            let (J, D) = (map.jacobian(), map.by_log(&phi_s));
             (log[k], g[k]) = (phi, phi_s);
             point.spin = R * J;
-            point.law_strain = R * Mat3::from_diagonal(&law.stiffness) * J;
-            point.law_log = -(point.law_strain * phi_s_phi);
-            point.law_phi = -so3::hat(m);
-            point.e_law = Vec3::zeros();
+            let (K_J, K_D) = (so3::rows_scaled(&law.stiffness, &J), so3::rows_scaled(&law.stiffness, &D));
+            (point.law_strain, point.law_log) = (K_J, K_D);
+            // p, and p' as far as the law has a part in it
+            let stress = R.tr_mul(m);
+            p[k] = J.tr_mul(&stress);
+            p_s[k] = D.tr_mul(&stress);
+            point.p_strain = so3::symmetric_product(&J, &K_J);
+            point.p_log = J.tr_mul(&K_D) + map.transposed_by_log(&stress);
+            point.slope_log = so3::symmetric_product(&D, &K_D) + map.hessian(&stress, &phi_s);
 
-            // ω and ω_t from the history, with δω = weight_v W φ, δω_t = weight_a W φ
-            let (spin, W) = match time {
-                Time::Static => (Motion::default(), Mat3::zeros()),
-                Time::Step { .. } => {
+            // ω and ω_t from the history, and their derivatives by φ
+            let (spin, omega_phi, omega_t_phi) = match time {
+                Time::Static => (Motion::default(), Mat3::zeros(), Mat3::zeros()),
+                _ => {
                     let theta = so3::log(&old.points[first + k].rotation.tr_mul(R));
-                    (time.motion(&past.spin, &theta), so3::inverse_right_jacobian(&theta) * R.transpose())
+                    let W = so3::inverse_right_jacobian(&theta) * R.transpose();
+                    let (spin, by_theta, t_by_theta) = time.spin_with_derivatives(past, &theta);
+                    (spin, by_theta * W, t_by_theta * W)
                 }
             };
             let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
@@ -574,7 +695,7 @@ pub fn assemble(
             let mut r_s_phi = -so3::hat(&r_s);
             point.w_n = Mat3::zeros();
             if system.extensible {
-                point.w_n = R * Mat3::from_diagonal(&rod.compliance) * R.transpose();
+                point.w_n = so3::columns_scaled(R, &rod.compliance) * R.transpose();
                 r_s_phi += point.w_n * so3::hat(n);
             }
 
@@ -583,10 +704,9 @@ pub fn assemble(
                 Row::Rotations => {
                     let slope = acceleration_slope(&spin, drag);
                     let mut by_omega = omega * e_3.transpose() - e_3 * omega.transpose() * 2.0;
-                    by_omega += Mat3::from_diagonal_element(omega.z) - so3::hat(&e_3) * drag;
+                    so3::add_hat(&mut by_omega, &(e_3 * -drag), omega.z);
                     w_s[k] = R * slope;
-                    let by_theta = by_omega * weight_v - so3::hat(&e_3) * weight_a;
-                    point.w_phi = R * by_theta * W - so3::hat(&w_s[k]);
+                    point.w_phi = R * (by_omega * omega_phi - so3::hat_times(&e_3, &omega_t_phi)) - so3::hat(&w_s[k]);
                     section.acceleration
                 }
                 Row::Positions => {
@@ -601,58 +721,77 @@ pub fn assemble(
             n_s[k] = (distributed - gravity) * rho_a;
             let spin_momentum = rho_i.component_mul(&omega);
             let rotary = R * (rho_i.component_mul(&omega_t) + omega.cross(&spin_momentum));
-            let by_omega = so3::hat(&omega) * Mat3::from_diagonal(&rho_i) - so3::hat(&spin_momentum);
-            let by_theta = by_omega * weight_v + Mat3::from_diagonal(&(rho_i * weight_a));
+            let by_omega = so3::columns_scaled(&so3::hat(&omega), &rho_i) - so3::hat(&spin_momentum);
+            let mut by_phi = by_omega * omega_phi;
+            for row in 0..3 {
+                for column in 0..3 {
+                    by_phi[(row, column)] += rho_i[row] * omega_t_phi[(row, column)];
+                }
+            }
             m_s[k] = rotary - r_s.cross(n);
-            point.m_phi = R * by_theta * W - so3::hat(&rotary) + so3::hat(n) * r_s_phi;
-            point.m_n = so3::hat(n) * point.w_n - so3::hat(&r_s);
+            point.m_phi = R * by_phi - so3::hat(&rotary) + so3::hat_times(n, &r_s_phi);
+            point.m_n = -so3::hat(&r_s);
+            if system.extensible {
+                point.m_n += so3::hat_times(n, &point.w_n);
+            }
+            p_s[k] += point.spin.tr_mul(&m_s[k]);
+            // Tᵀ m' = J_r(Φ) R₀ᵀ m'
+            point.slope_log += map.by_log(&node_0.rotation.tr_mul(&m_s[k]));
+            point.slope_phi = -so3::hat_times(&m_s[k], &point.spin).transpose();
         }
 
+        let log_1 = so3::log_near(&node_0.rotation.tr_mul(&node_1.rotation), &node_1.turn);
+        let map = so3::Tangent::new(&log_1);
+        let ends: &mut CellEnds = &mut system.cells[j];
+        ends.length = h;
+        ends.spin = node_1.rotation * map.jacobian();
+        ends.p_log = map.by_log(&node_0.rotation.tr_mul(&node_1.moment));
+        ends.p_phi = -so3::hat_times(&node_1.moment, &ends.spin).transpose();
+        let p_1 = ends.spin.tr_mul(&node_1.moment);
         let w_0 = accumulated(node_0);
         for k in 0..stages {
             let section = &state.points[first + k];
-            let point = &mut system.points[first + k];
-            point.e_log = log[k] - integral(Vec3::zeros(), h, &a[k], &g, stages);
-            point.e_w = accumulated(section) - integral(w_0, h, &a[k], &w_s, stages);
+            let residuals = &mut system.residuals.points[first + k];
+            residuals.log = log[k] - integral(Vec3::zeros(), h, &a[k], &g, stages);
+            residuals.w = accumulated(section) - integral(w_0, h, &a[k], &w_s, stages);
             let mut rest = [0.0; MAX_STAGES];
             for l in 0..stages {
                 rest[l] = a[k][l] - b[l];
             }
-            point.e_n = section.force - integral(node_1.force, h, &rest, &n_s, stages);
-            point.e_m = section.moment - integral(node_1.moment, h, &rest, &m_s, stages);
+            residuals.n = section.force - integral(node_1.force, h, &rest, &n_s, stages);
+            residuals.p = p[k] - integral(p_1, h, &rest, &p_s, stages);
         }
-        let log_1 = so3::log_near(&node_0.rotation.tr_mul(&node_1.rotation), &node_1.turn);
-        let ends: &mut CellEnds = &mut system.cells[j];
-        ends.length = h;
-        ends.spin = node_1.rotation * so3::right_jacobian(&log_1);
-        ends.e_log = log_1 - integral(Vec3::zeros(), h, b, &g, stages);
-        ends.e_w = accumulated(node_1) - integral(w_0, h, b, &w_s, stages);
-        ends.e_n = node_0.force - integral(node_1.force, -h, b, &n_s, stages);
-        ends.e_m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
+        let ends = &mut system.residuals.cells[j];
+        ends.log = log_1 - integral(Vec3::zeros(), h, b, &g, stages);
+        ends.w = accumulated(node_1) - integral(w_0, h, b, &w_s, stages);
+        ends.n = node_0.force - integral(node_1.force, -h, b, &n_s, stages);
+        ends.m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
     }
 
     // the base is where its path says, or free of load
     let base = &state.nodes[0];
-    (system.base, system.base_joint, system.base_load) = Default::default();
+    (system.base_joint, system.base_load) = Default::default();
+    let residuals = &mut system.residuals;
+    residuals.base_load = Default::default();
     if boundary.base.held == Held::CLAMPED {
         let Support { position: r, rotation: R, velocity: u, acceleration: a, .. } = boundary.base;
         let target = match row {
             Row::Rotations => a + u * drag,
             Row::Positions => r,
         };
-        system.base = (target - accumulated(base), so3::log(&(R * base.rotation.transpose())));
+        residuals.base = (target - accumulated(base), so3::log(&(R * base.rotation.transpose())));
     } else {
-        system.base_load = Relation { n: -base.force, m: -base.moment, ..Relation::default() };
-        system.base_joint = Some(attach(&boundary.base, base, &mut system.base_load));
+        residuals.base_load = (-base.force, -base.moment);
+        let (joint, t) = attach(&boundary.base, base, &mut system.base_load, &mut residuals.base_load);
+        (system.base_joint, residuals.base) = (Some(joint), t);
     }
 
     // the tip carries its loads and the body on it
     let tip = state.tip();
     let old_tip = old.tip();
     let past = old.tip_memory();
-    system.tip = Default::default();
-    system.tip.n = boundary.tip_force - tip.force;
-    system.tip.m = boundary.tip_moment - tip.moment;
+    system.tip_load = Default::default();
+    residuals.tip_load = (boundary.tip_force - tip.force, boundary.tip_moment - tip.moment);
     if rod.tip_mass > 0.0 {
         let (a_tip, by_w) = match row {
             Row::Rotations => (tip.acceleration - tip_velocity(mesh, old, state, boundary, time) * drag, 1.0),
@@ -660,21 +799,22 @@ pub fn assemble(
                 (time.motion(&past.travel, &(tip.position - old_tip.position)).acceleration.value, weight_a)
             }
         };
-        system.tip.n += (gravity - a_tip) * rod.tip_mass;
-        system.tip.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
+        residuals.tip_load.0 += (gravity - a_tip) * rod.tip_mass;
+        system.tip_load.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
     }
     if rod.tip_inertia > 0.0 && *time != Time::Static {
         let theta = so3::log(&old_tip.rotation.tr_mul(&tip.rotation));
         let R = tip.rotation;
-        let turning = R * time.motion(&past.spin, &theta).acceleration.value;
+        let turning = R * time.spin(past, &theta).acceleration.value;
         let W = so3::inverse_right_jacobian(&theta) * R.transpose();
-        system.tip.m -= turning * rod.tip_inertia;
-        system.tip.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
+        residuals.tip_load.1 -= turning * rod.tip_inertia;
+        system.tip_load.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
     }
-    system.tip_joint = None;
+    (system.tip_joint, residuals.tip) = Default::default();
     if boundary.tip.held != Held::FREE {
-        let joint = attach(&boundary.tip, tip, &mut system.tip);
+        let (joint, t) = attach(&boundary.tip, tip, &mut system.tip_load, &mut residuals.tip_load);
         system.tip_joint = Some(Joint { springs: springs(mesh, rod, state), ..joint });
+        residuals.tip = t;
     }
 }
 
@@ -682,33 +822,35 @@ pub fn assemble(
 fn coordinates(support: &Support, section: &Section) -> (Joint, Vec3) {
     let R_s = &support.rotation;
     let phi = so3::log(&R_s.tr_mul(&section.rotation));
-    let [a, b, c] = support.held.translation;
-    let [d, e, f] = support.held.rotation;
     let joint = Joint {
-        held: [a, b, c, d, e, f],
+        held: (support.held.translation, support.held.rotation),
         by_w: R_s.transpose(),
         by_phi: so3::inverse_right_jacobian(&phi).tr_mul(&R_s.transpose()),
         of_moment: so3::right_jacobian(&phi) * R_s.transpose(),
-        correction: Default::default(),
         springs: (0.0, 0.0),
     };
     (joint, phi)
 }
 
-/// The joint of an end with its support at an iterate. `load` is what the loads and the inertia of the end exceed its
-/// n and m by; the support takes from it what it carries.
-fn attach(support: &Support, section: &Section, load: &mut Relation) -> Joint {
-    let (mut joint, phi) = coordinates(support, section);
+/// The joint of an end with its support at an iterate, and t. `load` is what the loads and the inertia of the end exceed
+/// its n and m by, and `by_load` its derivative; the support takes from it what it carries.
+fn attach(
+    support: &Support,
+    section: &Section,
+    by_load: &mut Relation,
+    load: &mut (Vec3, Vec3),
+) -> (Joint, (Vec3, Vec3)) {
+    let (joint, phi) = coordinates(support, section);
     let (R_s, held) = (&support.rotation, &support.held);
-    joint.correction = (R_s.tr_mul(&(support.position - section.position)), -phi);
-    let carried = |held: &[bool; 3], lambda: &Vec3| Vec3::from_fn(|i, _| if held[i] { lambda[i] } else { 0.0 });
-    let (force, moment) = (-(joint.by_w * load.n), -(joint.of_moment * load.m));
+    let of_held = |held: &[bool; 3], xi: &Vec3| Vec3::from_fn(|i, _| if held[i] { xi[i] } else { 0.0 });
+    let (force, moment) = (-(joint.by_w * load.0), -(joint.of_moment * load.1));
     // of the whole moment: it is the free part of it that is to vanish, in axes that turn with the section
     let (_, derivative) = so3::rate_of_log(&phi, &moment);
-    load.n += R_s * carried(&held.translation, &force);
-    load.m += joint.by_phi.tr_mul(&carried(&held.rotation, &moment));
-    load.m_phi += R_s * derivative * joint.by_phi;
-    joint
+    load.0 += R_s * of_held(&held.translation, &force);
+    load.1 += joint.by_phi.tr_mul(&of_held(&held.rotation, &moment));
+    by_load.m_phi += R_s * derivative * joint.by_phi;
+    let away = R_s.tr_mul(&(support.position - section.position));
+    (joint, (of_held(&held.translation, &away), of_held(&held.rotation, &-phi)))
 }
 
 /// Springs on a held tip that make the rod on them about as stable as the held one: far stiffer than the rod, and than
@@ -758,14 +900,12 @@ pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundar
             w_s: R * acceleration_slope(&still, drag),
             n_s: -boundary.gravity * rod.mass_per_length,
             m_s: R * omega.cross(&rod.inertia_per_length.component_mul(&omega)),
-            moment: state.points[i].moment,
+            carried: Vec3::zeros(),
+            stress: R.tr_mul(&state.points[i].moment),
         }
     };
-    let tip = Relation {
-        n: boundary.tip_force + (boundary.gravity + state.tip_memory().travel.velocity.value * drag) * rod.tip_mass,
-        m: boundary.tip_moment,
-        ..Relation::default()
-    };
+    let held_back = state.tip_memory().travel.velocity.value * drag;
+    let tip = (boundary.tip_force + (boundary.gravity + held_back) * rod.tip_mass, boundary.tip_moment);
     assemble_rates(mesh, rod, state, state.nodes[0].acceleration, rates, tip, system);
     // the ends stand still in the axes of their supports
     hold_rates(boundary, state, system, |support, node| {
@@ -801,20 +941,28 @@ pub fn assemble_jerks(mesh: &Mesh, rod: &Rod, state: &mut State, sweep: &Sweep, 
             w_s: R * (omega.cross(&slope) + slope_t),
             n_s: Vec3::zeros(),
             m_s: R * rotary_t - (R * along).cross(&section.force),
-            moment: R * (omega.cross(&R.tr_mul(&section.moment)) + rod.stiffness.component_mul(&strain_t)),
+            carried: R * omega.cross(&(rotary - e_3.cross(&R.tr_mul(&section.force)))),
+            stress: rod.stiffness.component_mul(&strain_t),
         }
     };
     let Boundary { base, tip, .. } = &state.boundary;
     // what a support exerts turns with it
     let (force, moment) = state.tip_reaction(rod);
-    let load = Relation {
-        n: state.tip_memory().travel.acceleration.value * (drag * rod.tip_mass) + tip.angular_velocity.cross(&force),
-        m: tip.angular_velocity.cross(&moment),
-        ..Relation::default()
-    };
+    let load = (
+        state.tip_memory().travel.acceleration.value * (drag * rod.tip_mass) + tip.angular_velocity.cross(&force),
+        tip.angular_velocity.cross(&moment),
+    );
     assemble_rates(mesh, rod, state, base.acceleration * drag, rates, load, system);
-    system.base_load.n = base.angular_velocity.cross(&state.nodes[0].force);
-    system.base_load.m = base.angular_velocity.cross(&state.nodes[0].moment);
+    let stages = mesh.rule.stages;
+    for (j, ends) in system.cells.iter().enumerate() {
+        // a start moves rigidly: a node as the point before it
+        let last = (j + 1) * stages - 1;
+        let spin = state.points[last].rotation * state.memory[last].spin.velocity.value;
+        let carried = ends.spin.tr_mul(&spin.cross(&state.nodes[j + 1].moment));
+        system.residuals.points[j * stages..][..stages].iter_mut().for_each(|point| point.p += carried);
+    }
+    let Section { force, moment, .. } = &state.nodes[0];
+    system.residuals.base_load = (base.angular_velocity.cross(force), base.angular_velocity.cross(moment));
     hold_rates(&state.boundary, state, system, |support, node| {
         let (section, spin) = (&state.nodes[node], support.angular_velocity);
         let drift = spin.cross(&(section.position - support.position));
@@ -834,10 +982,15 @@ fn hold_rates(
     let joint = |support: &Support, node: usize| {
         let (joint, _) = coordinates(support, &state.nodes[node]);
         let (w, phi) = rates(support, node);
-        Joint { correction: (joint.by_w * w, joint.by_phi * phi), ..joint }
+        (Some(joint), (joint.by_w * w, joint.by_phi * phi))
     };
-    system.base_joint = (boundary.base.held != Held::CLAMPED).then(|| joint(&boundary.base, 0));
-    system.tip_joint = (boundary.tip.held != Held::FREE).then(|| joint(&boundary.tip, state.nodes.len() - 1));
+    (system.base_joint, system.tip_joint) = (None, None);
+    if boundary.base.held != Held::CLAMPED {
+        (system.base_joint, system.residuals.base) = joint(&boundary.base, 0);
+    }
+    if boundary.tip.held != Held::FREE {
+        (system.tip_joint, system.residuals.tip) = joint(&boundary.tip, state.nodes.len() - 1);
+    }
 }
 
 /// κ_tt at a point that so far moves rigidly, from the angular accelerations in `sweep`.
@@ -857,12 +1010,16 @@ fn strain_acceleration(mesh: &Mesh, state: &State, sweep: &Sweep, point: usize) 
     so3::right_jacobian(&phi) * (phi_s_tt - derivative * phi_tt)
 }
 
-/// The known parts of a_s, n_s, m_s and m at a point in the equations for accelerations or their rates.
+/// What is known at a point in the equations for accelerations or their rates.
 struct Rates {
+    /// Of a_s, n_s, m_s.
     w_s: Vec3,
     n_s: Vec3,
     m_s: Vec3,
-    moment: Vec3,
+    /// The part of m_s that only turns it with the section: none of it is in p'.
+    carried: Vec3,
+    /// Rᵀm, or its rate.
+    stress: Vec3,
 }
 
 /// The common linear operator: w_s = R (Rᵀφ × e₃) + …, n_s = ρA w + …, m_s = R ρI Rᵀφ − r_s × n + …, m given.
@@ -872,96 +1029,92 @@ fn assemble_rates(
     state: &State,
     base: Vec3,
     rates: impl Fn(usize) -> Rates,
-    tip: Relation,
+    tip: (Vec3, Vec3),
     system: &mut System,
 ) {
     let stages = mesh.rule.stages;
     let zero = [Vec3::zeros(); MAX_STAGES];
     for j in 0..mesh.cells.len() {
         let first = j * stages;
-        let (mut w_s, mut n_s, mut m_s) = (zero, zero, zero);
-        let mut moment = zero;
+        let (mut w_s, mut n_s, mut m_s, mut p, mut p_s) = (zero, zero, zero, zero, zero);
         for k in 0..stages {
-            let R = &state.points[first + k].rotation;
+            let Section { rotation: R, turn, .. } = &state.points[first + k];
             let r_s = tangent(rod, &state.points[first + k]);
-            Rates { w_s: w_s[k], n_s: n_s[k], m_s: m_s[k], moment: moment[k] } = rates(first + k);
+            let known = rates(first + k);
+            (w_s[k], n_s[k], m_s[k]) = (known.w_s, known.n_s, known.m_s);
+            let map = so3::Tangent::new(turn);
+            let (J, g) = (map.jacobian(), map.inverse_times(&state.memory[first + k].kappa));
+            p[k] = J.tr_mul(&known.stress);
+            p_s[k] = J.tr_mul(&R.tr_mul(&(m_s[k] - known.carried))) + map.by_log(&g).tr_mul(&known.stress);
             system.points[first + k] = Point {
-                spin: *R,
+                spin: R * J,
                 w_phi: -so3::hat(&r_s),
                 m_phi: R * Mat3::from_diagonal(&rod.inertia_per_length) * R.transpose(),
                 m_n: -so3::hat(&r_s),
                 ..Point::default()
             };
         }
-        set_loads(mesh, j, &w_s, &n_s, &m_s, system);
+        let Section { rotation: R, turn, .. } = &state.nodes[j + 1];
+        let spin = R * so3::right_jacobian(turn);
+        system.cells[j] = CellEnds { length: mesh.cells[j].length, spin, ..CellEnds::default() };
+        set_loads(mesh, j, [&w_s, &n_s, &m_s, &p_s], &mut system.residuals);
         for k in 0..stages {
-            // the sweep solves for the whole moment, and the law says what it is
-            system.points[first + k].e_law = moment[k];
+            system.residuals.points[first + k].p += p[k];
         }
-        system.cells[j].spin = state.nodes[j + 1].rotation;
     }
     system.mass = rod.mass_per_length;
-    system.base = (base, Vec3::zeros());
     system.base_load = Relation::default();
-    system.tip = Relation {
+    system.tip_load = Relation {
         n_w: Mat3::from_diagonal_element(-rod.tip_mass),
         m_phi: Mat3::from_diagonal_element(-rod.tip_inertia),
-        ..tip
+        ..Relation::default()
     };
+    let residuals = &mut system.residuals;
+    (residuals.base, residuals.base_load) = ((base, Vec3::zeros()), Default::default());
+    (residuals.tip, residuals.tip_load) = (Default::default(), tip);
 }
 
-/// Residuals of a cell of a linear problem in which everything is zero but the given w_s, n_s and m_s.
-fn set_loads(
-    mesh: &Mesh,
-    j: usize,
-    w_s: &[Vec3; MAX_STAGES],
-    n_s: &[Vec3; MAX_STAGES],
-    m_s: &[Vec3; MAX_STAGES],
-    system: &mut System,
-) {
+/// Residuals of a cell of a linear problem in which everything is zero but the given w_s, n_s, m_s and p'.
+fn set_loads(mesh: &Mesh, j: usize, [w_s, n_s, m_s, p_s]: [&[Vec3; MAX_STAGES]; 4], residuals: &mut Residuals) {
     let Gauss { stages, a, b, .. } = &mesh.rule;
     let h = mesh.cells[j].length;
     let sum = |step: f64, weights: &[f64; MAX_STAGES], slopes| -integral(Vec3::zeros(), step, weights, slopes, *stages);
     for k in 0..*stages {
-        let point = &mut system.points[j * stages + k];
+        let point = &mut residuals.points[j * stages + k];
         let mut rest = [0.0; MAX_STAGES];
         for l in 0..*stages {
             rest[l] = a[k][l] - b[l];
         }
-        point.e_log = Vec3::zeros();
-        point.e_w = sum(h, &a[k], w_s);
-        point.e_n = sum(h, &rest, n_s);
-        point.e_m = sum(h, &rest, m_s);
+        point.log = Vec3::zeros();
+        point.w = sum(h, &a[k], w_s);
+        point.n = sum(h, &rest, n_s);
+        point.p = sum(h, &rest, p_s);
     }
-    let ends = &mut system.cells[j];
-    ends.length = h;
-    ends.e_log = Vec3::zeros();
-    ends.e_w = sum(h, b, w_s);
-    ends.e_n = sum(-h, b, n_s);
-    ends.e_m = sum(-h, b, m_s);
+    let ends = &mut residuals.cells[j];
+    ends.log = Vec3::zeros();
+    ends.w = sum(h, b, w_s);
+    ends.n = sum(-h, b, n_s);
+    ends.m = sum(-h, b, m_s);
 }
 
-/// Makes the residuals of `system` the inertia of the displacements `y` (position, rotation; of all points, then the
+/// Makes `residuals` the inertia of the displacements `y` (position, rotation; of all points, then the
 /// tip) vibrating with ω = 1.
-pub fn load_with_inertia(mesh: &Mesh, rod: &Rod, state: &State, y: &[(Vec3, Vec3)], system: &mut System) {
+pub fn load_with_inertia(mesh: &Mesh, rod: &Rod, state: &State, y: &[(Vec3, Vec3)], residuals: &mut Residuals) {
     let stages = mesh.rule.stages;
     let zero = [Vec3::zeros(); MAX_STAGES];
     for j in 0..mesh.cells.len() {
-        let (mut n_s, mut m_s) = (zero, zero);
+        let (mut n_s, mut m_s, mut p_s) = (zero, zero, zero);
         for k in 0..stages {
             let i = j * stages + k;
-            let R = &state.points[i].rotation;
+            let Section { rotation: R, turn, .. } = &state.points[i];
             n_s[k] = y[i].0 * -rod.mass_per_length;
-            m_s[k] = R * rod.inertia_per_length.component_mul(&R.tr_mul(&y[i].1)) * -1.0;
+            let m_s_body = rod.inertia_per_length.component_mul(&R.tr_mul(&y[i].1)) * -1.0;
+            m_s[k] = R * m_s_body;
+            p_s[k] = so3::right_jacobian(turn).tr_mul(&m_s_body);
         }
-        set_loads(mesh, j, &zero, &n_s, &m_s, system);
+        set_loads(mesh, j, [&zero, &n_s, &m_s, &p_s], residuals);
     }
     let (w, phi) = y[y.len() - 1];
-    system.base = Default::default();
-    (system.base_load.n, system.base_load.m) = Default::default();
-    for joint in [&mut system.base_joint, &mut system.tip_joint].into_iter().flatten() {
-        joint.correction = Default::default();
-    }
-    system.tip.n = w * rod.tip_mass;
-    system.tip.m = phi * rod.tip_inertia;
+    (residuals.base, residuals.base_load, residuals.tip) = Default::default();
+    residuals.tip_load = (w * rod.tip_mass, phi * rod.tip_inertia);
 }

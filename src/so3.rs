@@ -22,6 +22,45 @@ pub fn hat(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
+/// Adds v̂ + x 1 to a matrix: six sums and three, where those of whole matrices are eighteen.
+#[inline]
+pub fn add_hat(matrix: &mut Matrix3<f64>, v: &Vector3<f64>, x: f64) {
+    let [a, b, c] = &mut matrix.data.0;
+    *a = [a[0] + x, a[1] + v.z, a[2] - v.y];
+    *b = [b[0] - v.z, b[1] + x, b[2] + v.x];
+    *c = [c[0] + v.y, c[1] - v.x, c[2] + x];
+}
+
+/// v̂ M.
+#[inline]
+pub fn hat_times(v: &Vector3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let column = |j: usize| {
+        let [x, y, z] = matrix.data.0[j];
+        Vector3::new(v.y * z - v.z * y, v.z * x - v.x * z, v.x * y - v.y * x)
+    };
+    Matrix3::from_columns(&[column(0), column(1), column(2)])
+}
+
+/// M diag(d).
+#[inline]
+pub fn columns_scaled(matrix: &Matrix3<f64>, d: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| matrix[(i, j)] * d[j])
+}
+
+/// diag(d) M.
+#[inline]
+pub fn rows_scaled(d: &Vector3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| d[i] * matrix[(i, j)])
+}
+
+/// Aᵀ B where that is symmetric.
+#[inline]
+pub fn symmetric_product(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
+    let entry = |i: usize, j: usize| a.column(i).dot(&b.column(j));
+    let (xy, xz, yz) = (entry(0, 1), entry(0, 2), entry(1, 2));
+    Matrix3::new(entry(0, 0), xy, xz, xy, entry(1, 1), yz, xz, yz, entry(2, 2))
+}
+
 /// Value of the power series Σ cₙ xⁿ.
 #[inline]
 fn series<const N: usize>(coefficients: [f64; N], x: f64) -> f64 {
@@ -145,14 +184,118 @@ pub fn log_near(rotation: &Matrix3<f64>, reference: &Vector3<f64>) -> Vector3<f6
 /// J_r(Φ).
 #[inline]
 pub fn right_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
-    let phi2 = phi.norm_squared();
-    let (_, b, d) = exp_coefficients(phi2);
-    let mut jacobian = phi * phi.transpose() * d - hat(&(phi * b));
-    let diagonal = 1.0 - d * phi2;
-    jacobian[(0, 0)] += diagonal;
-    jacobian[(1, 1)] += diagonal;
-    jacobian[(2, 2)] += diagonal;
+    let (_, b, d) = exp_coefficients(phi.norm_squared());
+    jacobian(phi, b, d)
+}
+
+/// 1 − b Φ̂ + d Φ̂².
+#[inline]
+fn jacobian(phi: &Vector3<f64>, b: f64, d: f64) -> Matrix3<f64> {
+    let mut jacobian = phi * d * phi.transpose();
+    add_hat(&mut jacobian, &(phi * -b), 1.0 - d * phi.norm_squared());
     jacobian
+}
+
+/// What differentiating J_r(Φ) yields, at one Φ.
+#[derive(Clone, Copy, Debug)]
+pub struct Tangent {
+    phi: Vector3<f64>,
+    /// b and d, each with its first and second derivative by φ².
+    b: [f64; 3],
+    d: [f64; 3],
+}
+
+impl Tangent {
+    /// At Φ.
+    #[inline]
+    pub fn new(phi: &Vector3<f64>) -> Self {
+        // coefficients of Σ (−φ²)ⁿ / (2n + first)! and of its derivatives
+        const fn taylor(first: usize) -> [[f64; 7]; 3] {
+            let mut all = [[0.0; 7]; 3];
+            let (mut n, mut term) = (0, 1.0 / if first == 2 { 2.0 } else { 6.0 });
+            while n < 9 {
+                let x = n as f64;
+                let derivatives = [term, x * term, x * (x - 1.0) * term];
+                let mut order = 0;
+                while order < 3 {
+                    if n >= order && n - order < 7 {
+                        all[order][n - order] = derivatives[order];
+                    }
+                    order += 1;
+                }
+                term /= -(((2 * n + first + 1) * (2 * n + first + 2)) as f64);
+                n += 1;
+            }
+            all
+        }
+        const B: [[f64; 7]; 3] = taylor(2);
+        const D: [[f64; 7]; 3] = taylor(3);
+        let phi2 = phi.norm_squared();
+        let (b, d) = if phi2 < SERIES {
+            (B.map(|coefficients| series(coefficients, phi2)), D.map(|coefficients| series(coefficients, phi2)))
+        } else {
+            let (a, b, d) = exp_coefficients(phi2);
+            let half = 0.5 / phi2;
+            let a_1 = (phi2.sqrt().cos() - a) * half;
+            let (b_1, d_1) = ((a - 2.0 * b) * half, (b - 3.0 * d) * half);
+            ([b, b_1, (a_1 - 4.0 * b_1) * half], [d, d_1, (b_1 - 5.0 * d_1) * half])
+        };
+        Self { phi: *phi, b, d }
+    }
+
+    /// J_r(Φ).
+    #[inline]
+    pub fn jacobian(&self) -> Matrix3<f64> {
+        jacobian(&self.phi, self.b[0], self.d[0])
+    }
+
+    /// J_r⁻¹(Φ) x, |Φ| < 2π.
+    #[inline]
+    pub fn inverse_times(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        let Self { phi, b: [b, b_1, _], .. } = self;
+        let once = phi.cross(x);
+        // c = −b'/b
+        x + once * 0.5 - phi.cross(&once) * (b_1 / b)
+    }
+
+    /// ∂(J_r(Φ) x)/∂Φ.
+    #[inline]
+    pub fn by_log(&self, x: &Vector3<f64>) -> Matrix3<f64> {
+        self.derivative(1.0, x)
+    }
+
+    /// ∂(J_rᵀ(Φ) x)/∂Φ.
+    #[inline]
+    pub fn transposed_by_log(&self, x: &Vector3<f64>) -> Matrix3<f64> {
+        // J_rᵀ(Φ) = J_r(−Φ)
+        self.derivative(-1.0, x)
+    }
+
+    /// Of x − sign b Φ×x + d Φ×(Φ×x).
+    #[inline]
+    fn derivative(&self, sign: f64, x: &Vector3<f64>) -> Matrix3<f64> {
+        let Self { phi, b: [b, b_1, _], d: [d, d_1, _] } = self;
+        let once = phi.cross(x);
+        let along = phi.cross(&once) * (2.0 * d_1) - once * (2.0 * sign * b_1) - x * *d;
+        let mut derivative = along * phi.transpose();
+        add_hat(&mut derivative, &(x * (sign * b) - once * *d), d * phi.dot(x));
+        derivative
+    }
+
+    /// ∂²(x · J_r(Φ) y)/∂Φ².
+    #[inline]
+    pub fn hessian(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
+        let Self { phi, b: [_, b_1, b_2], d: [d, d_1, d_2] } = self;
+        // x · J_r(Φ) y = x · y − b Φ · v + d Φ · S Φ
+        let v = y.cross(x);
+        let turned = (y * phi.dot(x) + x * phi.dot(y)) * 0.5 - phi * x.dot(y);
+        let (by_v, by_s) = (phi.dot(&v), phi.dot(&turned));
+        let along = turned * (4.0 * d_1) - v * (2.0 * b_1) + phi * (2.0 * (d_2 * by_s - b_2 * by_v));
+        let twice = |i: usize, j: usize| along[i] * phi[j] + along[j] * phi[i] + (x[i] * y[j] + x[j] * y[i]) * d;
+        let same = 2.0 * (d_1 * by_s - b_1 * by_v - d * x.dot(y));
+        let (xy, xz, yz) = (twice(0, 1), twice(0, 2), twice(1, 2));
+        Matrix3::new(twice(0, 0) + same, xy, xz, xy, twice(1, 1) + same, yz, xz, yz, twice(2, 2) + same)
+    }
 }
 
 /// J_r⁻¹(Φ), |Φ| < 2π.
@@ -182,6 +325,58 @@ pub fn rate_of_log(phi: &Vector3<f64>, kappa: &Vector3<f64>) -> (Vector3<f64>, M
     derivative[(1, 1)] += dot;
     derivative[(2, 2)] += dot;
     (value, derivative)
+}
+
+/// The derivatives of b and d by φ².
+#[inline]
+fn exp_derivatives(phi2: f64, (a, b, d): (f64, f64, f64)) -> (f64, f64) {
+    if phi2 < SERIES {
+        let b =
+            [-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0, -1.0 / 95_800_320.0, 1.0 / 14_529_715_200.0];
+        let d = [
+            -1.0 / 120.0,
+            1.0 / 2520.0,
+            -1.0 / 120_960.0,
+            1.0 / 9_979_200.0,
+            -1.0 / 1_245_404_160.0,
+            1.0 / 217_945_728_000.0,
+        ];
+        (series(b, phi2), series(d, phi2))
+    } else {
+        ((a - 2.0 * b) / (2.0 * phi2), (b - 3.0 * d) / (2.0 * phi2))
+    }
+}
+
+/// κ = J_r(Φ) x and its rate at fixed x while Φ changes by Φ_t.
+#[inline]
+pub fn right_jacobian_rate(phi: &Vector3<f64>, phi_t: &Vector3<f64>, x: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let phi2 = phi.norm_squared();
+    let coefficients = exp_coefficients(phi2);
+    let (_, b, d) = coefficients;
+    let (db, dd) = exp_derivatives(phi2, coefficients);
+    let stretch = 2.0 * phi.dot(phi_t);
+    let (once, once_t) = (phi.cross(x), phi_t.cross(x));
+    let (twice, twice_t) = (phi.cross(&once), phi_t.cross(&once) + phi.cross(&once_t));
+    let rate = twice * (dd * stretch) + twice_t * d - once * (db * stretch) - once_t * b;
+    (x - once * b + twice * d, rate)
+}
+
+/// The derivative of J_r(Φ) x by Φ at fixed x.
+#[inline]
+pub fn right_jacobian_derivative(phi: &Vector3<f64>, x: &Vector3<f64>) -> Matrix3<f64> {
+    let phi2 = phi.norm_squared();
+    let coefficients = exp_coefficients(phi2);
+    let (_, b, d) = coefficients;
+    let (db, dd) = exp_derivatives(phi2, coefficients);
+    let once = phi.cross(x);
+    let twice = phi.cross(&once);
+    // Φ̂x̂ = xΦᵀ − (Φ·x)1
+    let mut derivative = (twice * (2.0 * dd) - once * (2.0 * db) - x * d) * phi.transpose() + hat(&(x * b - once * d));
+    let dot = phi.dot(x) * d;
+    derivative[(0, 0)] += dot;
+    derivative[(1, 1)] += dot;
+    derivative[(2, 2)] += dot;
+    derivative
 }
 
 /// R with the rounding of many products removed: one Newton step towards RᵀR = 1.
@@ -265,6 +460,19 @@ mod tests {
     }
 
     #[test]
+    fn products_with_hats_and_diagonals() {
+        let (v, matrix) = (Vector3::new(0.3, -0.7, 0.2), Matrix3::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0));
+        assert!((hat_times(&v, &matrix) - hat(&v) * matrix).amax() < 1e-15);
+        let mut sum = matrix;
+        add_hat(&mut sum, &v, 0.5);
+        assert!((sum - matrix - hat(&v) - Matrix3::identity() * 0.5).amax() < 1e-15);
+        assert!((columns_scaled(&matrix, &v) - matrix * Matrix3::from_diagonal(&v)).amax() < 1e-15);
+        let scaled = rows_scaled(&v, &matrix);
+        assert!((symmetric_product(&matrix, &scaled) - matrix.transpose() * scaled).amax() < 2e-14);
+        assert!((rows_scaled(&v, &matrix) - Matrix3::from_diagonal(&v) * matrix).amax() < 1e-15);
+    }
+
+    #[test]
     fn log_near_continues_beyond_a_half_turn() {
         let axis = Vector3::new(0.36, -0.48, 0.8);
         let mut phi = Vector3::zeros();
@@ -289,6 +497,30 @@ mod tests {
             let difference = (forward - backward) / (2.0 * eps);
             assert!((difference - right_jacobian(&phi) * direction).norm() < 1e-9);
         }
+    }
+
+    #[test]
+    fn the_tangent_map_has_its_derivatives() {
+        let (x, y) = (Vector3::new(1.3, -0.4, 2.1), Vector3::new(-0.5, 1.7, 0.6));
+        let direction = Vector3::new(0.3, -0.7, 0.2);
+        let eps = 1e-5;
+        for phi in vectors() {
+            let tangent = Tangent::new(&phi);
+            assert!((tangent.jacobian() - right_jacobian(&phi)).amax() < 1e-15);
+            assert!((tangent.inverse_times(&x) - inverse_right_jacobian(&phi) * x).norm() < 1e-14);
+            let difference = |f: &dyn Fn(&Vector3<f64>) -> Vector3<f64>| {
+                (f(&(phi + direction * eps)) - f(&(phi - direction * eps))) / (2.0 * eps)
+            };
+            let by_log = difference(&|phi| right_jacobian(phi) * x);
+            assert!((by_log - tangent.by_log(&x) * direction).norm() < 1e-9, "{phi}");
+            let by_log = difference(&|phi| right_jacobian(phi).tr_mul(&x));
+            assert!((by_log - tangent.transposed_by_log(&x) * direction).norm() < 1e-9, "{phi}");
+            let gradient = difference(&|phi| Tangent::new(phi).by_log(&y).tr_mul(&x));
+            assert!((gradient - tangent.hessian(&x, &y) * direction).norm() < 1e-9, "{phi}");
+        }
+        // series and closed form meet
+        let at = |phi2: f64| Tangent::new(&(Vector3::new(0.36, -0.48, 0.8) * phi2.sqrt())).hessian(&x, &y);
+        assert!((at(SERIES * (1.0 - 1e-15)) - at(SERIES * (1.0 + 1e-15))).amax() < 1e-13);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A banded LU with partial pivoting: the oracle of the sweep. It knows only numbers.
 
 use crate::full::Full;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector};
 
 /// A band matrix by rows, with room for the fill of row exchanges.
 pub struct Banded {
@@ -14,25 +14,28 @@ pub struct Banded {
 impl Banded {
     /// The matrix of a system.
     pub fn new(full: &Full) -> Self {
-        Self::of_blocks(full.layout.blocks(), &full.entries)
+        let Full { layout, entries, .. } = full;
+        let rows = layout.places(&layout.kinds_of_equations());
+        let columns = layout.places(&layout.unknowns());
+        let numbers = |(row, column, block): &(usize, usize, DMatrix<f64>)| {
+            let (row, column) = (rows[*row], columns[*column]);
+            let number = |(place, x): (usize, &f64)| (row + place % block.nrows(), column + place / block.nrows(), *x);
+            block.iter().enumerate().map(number).collect::<Vec<_>>()
+        };
+        Self::of_numbers(columns[layout.blocks()], &entries.iter().flat_map(numbers).collect::<Vec<_>>())
     }
 
-    /// The matrix of `blocks` by `blocks` blocks, from the row, column and value of those there are; such at the same
-    /// place add up.
-    pub fn of_blocks(blocks: usize, entries: &[(usize, usize, Matrix3<f64>)]) -> Self {
+    /// The matrix of so many rows from the row, column and value of the numbers there are; such at the same place add
+    /// up.
+    pub fn of_numbers(size: usize, entries: &[(usize, usize, f64)]) -> Self {
         let reach = |distance: &dyn Fn(usize, usize) -> usize| {
-            entries.iter().map(|(row, column, _)| 3 * distance(*row, *column) + 2).max().unwrap_or(0)
+            entries.iter().map(|(row, column, _)| distance(*row, *column)).max().unwrap_or(0)
         };
         let below = reach(&|row, column| row.saturating_sub(column));
         let above = reach(&|row, column| column.saturating_sub(row));
-        let size = 3 * blocks;
         let mut matrix = Self { size, below, above, rows: vec![0.0; size * (2 * below + above + 1)] };
-        for (row, column, block) in entries {
-            for i in 0..3 {
-                for j in 0..3 {
-                    *matrix.at(3 * row + i, 3 * column + j) += block[(i, j)];
-                }
-            }
+        for (row, column, x) in entries {
+            *matrix.at(*row, *column) += x;
         }
         matrix
     }
@@ -172,6 +175,6 @@ impl Factors {
 }
 
 /// The numbers of a block vector.
-pub fn flat(blocks: &[Vector3<f64>]) -> Vec<f64> {
+pub fn flat(blocks: &[DVector<f64>]) -> Vec<f64> {
     blocks.iter().flat_map(|block| block.iter().copied()).collect()
 }
