@@ -77,6 +77,28 @@ pub struct Boundary {
     pub gravity: Vec3,
 }
 
+/// How fast what acts on the rod changes, world frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rates {
+    /// Of the base's acceleration, m/s³.
+    pub jerk: Vec3,
+    /// Of the base's angular velocity, rad/s².
+    pub angular_acceleration: Vec3,
+    /// Of the force on the tip, N/s.
+    pub tip_force: Vec3,
+    /// Of the moment on the tip, N·m/s.
+    pub tip_moment: Vec3,
+}
+
+/// What acts on the rod at one instant, and how it goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// At this instant.
+    pub boundary: Boundary,
+    /// From this instant on.
+    pub rates: Rates,
+}
+
 impl Boundary {
     /// A base, a free tip without loads.
     pub fn hanging_from(base: Support, gravity: Vec3) -> Self {

@@ -72,6 +72,16 @@ impl Energy {
         }
     }
 
+    /// Energies of `state`, with the works and losses `work` added to those so far.
+    pub fn with(&self, mesh: &Mesh, rod: &Rod, state: &State, gravity: &Vector3<f64>, work: &Powers) -> Self {
+        Self {
+            dissipated: self.dissipated + work.lost,
+            work_base: self.work_base + work.base,
+            work_tip: self.work_tip + work.tip,
+            ..Self::of(mesh, rod, state, gravity)
+        }
+    }
+
     /// kinetic + elastic + gravity.
     pub fn total(&self) -> f64 {
         self.kinetic + self.elastic + self.gravity
@@ -80,6 +90,47 @@ impl Energy {
     /// What the balance misses: zero but for the error of the time scheme, and its numerical damping.
     pub fn residual(&self, start: &Self) -> f64 {
         self.total() + self.dissipated - start.total() - self.work_base - self.work_tip
+    }
+}
+
+/// What is done on the rod and lost in it per time, W; or, summed over a step, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Powers {
+    /// By the base.
+    pub base: f64,
+    /// By the tip's force, moment and support.
+    pub tip: f64,
+    /// Lost in damping and drag.
+    pub lost: f64,
+}
+
+impl Powers {
+    /// Of a state under `boundary`.
+    pub fn of(mesh: &Mesh, rod: &Rod, state: &State, boundary: &Boundary) -> Self {
+        let (base, node) = (&boundary.base, &state.nodes[0]);
+        let (tip, memory) = (state.tip(), state.tip_memory());
+        let (force, moment) = state.tip_reaction(rod);
+        let spin = tip.rotation * memory.spin.velocity.value;
+        Self {
+            base: -node.force.dot(&base.velocity) - node.moment.dot(&base.angular_velocity),
+            tip: (boundary.tip_force + force).dot(&memory.travel.velocity.value)
+                + (boundary.tip_moment + moment).dot(&spin),
+            lost: losses(mesh, rod, state),
+        }
+    }
+
+    /// For `time` s.
+    pub fn times(self, time: f64) -> Self {
+        Self { base: self.base * time, tip: self.tip * time, lost: self.lost * time }
+    }
+
+    /// And `other` for `time` s.
+    pub fn plus(self, other: Self, time: f64) -> Self {
+        Self {
+            base: self.base + other.base * time,
+            tip: self.tip + other.tip * time,
+            lost: self.lost + other.lost * time,
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 //!
 //! ```text
 //! host =C=> fmi2 -> unit -> {path, modes, energy, stepper} -> pose -> sweep
+//!                       tests -> plane -> {rosenbrock, energy, pose}
 //!         examples, tests -> rate -> formulation -> {energy, stepper}
 //!                       pose, rate -> {alpha, boundary, rod, mesh, so3}
 //! ```
@@ -20,13 +21,16 @@
 //! what both offer to those who set one beside the other; [`stepper`] says for both what a step reports and why it
 //! fails. The unit knows neither [`rate`] nor [`formulation`].
 //!
+//! A rod that stays in a plane has in [`plane`] a third way: an ordinary differential equation in its angles alone, on the
+//! same rods, meshes and ends, which [`rosenbrock`] integrates.
+//!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
 //!    line, and the rest compiles.
 //! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread,
 //!    clock or mutable static in the library.
-//! 4. [`sweep`] and [`rate::Band`] know blocks and no rod, [`alpha`] knows numbers and no rod; only [`pose`] and [`rate`]
-//!    know which unknowns a section has.
+//! 4. [`sweep`] and [`rate::Band`] know blocks and no rod, [`alpha`] and [`rosenbrock`] know numbers and no rod; only
+//!    [`pose`], [`plane`] and [`rate`] know which unknowns a section has.
 //! 5. [`pose::State`] and [`rate::State`] are plain data; everything a later step depends on is in them. Rebuilding the
 //!    storage around them changes no bit of any result. Same inputs, same bits.
 //! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry
@@ -54,9 +58,12 @@ pub mod mesh;
 pub mod rod;
 pub mod sweep;
 pub mod alpha;
+pub mod runge_kutta;
+pub mod rosenbrock;
 pub mod boundary;
 pub mod pose;
 pub mod energy;
+pub mod plane;
 pub mod stepper;
 pub mod formulation;
 pub mod rate;

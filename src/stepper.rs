@@ -8,11 +8,13 @@
 
 use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
+use crate::energy::Powers;
 use crate::mesh::Mesh;
-use crate::pose::{self, Row, State, Time};
+use crate::pose::{self, Known, Row, State, Time};
 use crate::rod::Rod;
+use crate::runge_kutta;
 use crate::so3;
-use crate::sweep::{Increment, Scales, Singular, Sweep, System};
+use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -20,6 +22,8 @@ use std::fmt;
 const MAX_ITERATIONS: usize = 25;
 /// The same with relaxation μ = ½, where each iteration gains at most one bit of the residual.
 const MAX_RELAXED_ITERATIONS: usize = 60;
+/// The same in a stage of a step of order 4, which begins with a good guess or is better taken smaller.
+const MAX_STAGE_ITERATIONS: usize = 10;
 /// Largest rotation of a section in one iteration, rad: beyond it the linearisation of a rotation means little.
 const MAX_ROTATION: f64 = 0.7;
 /// Increment, scaled, after which Newton has converged: the next would be of the order of its square.
@@ -104,6 +108,49 @@ impl fmt::Display for Diverged {
 
 impl std::error::Error for Diverged {}
 
+/// A step of order 4 that was computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attempt {
+    /// Newton iterations, of all stages.
+    pub iterations: usize,
+    /// Estimate of its error: how far it moves the centreline, over the length of the rod.
+    pub error: f64,
+    /// What was done in it, J.
+    pub work: Powers,
+}
+
+/// Rates of the coordinates θ of a section since the beginning of a step, and of its κ; body frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rates {
+    theta_t: Vector3<f64>,
+    theta_tt: Vector3<f64>,
+    kappa_t: Vector3<f64>,
+}
+
+/// The largest increments of an iteration.
+struct Largest {
+    turn: f64,
+    force: f64,
+    moment: f64,
+}
+
+impl Largest {
+    fn of(sweep: &Sweep) -> Self {
+        let mut largest = Self { turn: 0.0, force: 0.0, moment: 0.0 };
+        for delta in sweep.nodes.iter().chain(&sweep.points) {
+            largest.turn = larger(largest.turn, delta.phi.norm());
+            largest.force = larger(largest.force, delta.n.amax());
+            largest.moment = larger(largest.moment, delta.m.amax());
+        }
+        largest
+    }
+}
+
+/// A maximum would drop what is not a number.
+fn larger(largest: f64, x: f64) -> f64 {
+    if x <= largest { largest } else { x }
+}
+
 /// A rod on a mesh with the storage to move it; after its construction nothing is allocated.
 #[derive(Clone, Debug)]
 pub struct Stepper {
@@ -117,6 +164,8 @@ pub struct Stepper {
     trial: State,
     system: System,
     sweep: Sweep,
+    /// The rates at the stages of a step of order 4, of everything that has a history.
+    stages: Vec<[Rates; runge_kutta::STAGES]>,
 }
 
 impl Stepper {
@@ -125,7 +174,8 @@ impl Stepper {
         let extensible = rod.is_extensible();
         let system = System::new(mesh.cells.len(), &mesh.rule, extensible);
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
-        Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep }
+        let stages = vec![Default::default(); state.memory.len()];
+        Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep, stages }
     }
 
     /// The state before the last step.
@@ -210,6 +260,136 @@ impl Stepper {
         self.solve(boundary, &Time::Static)
     }
 
+    /// Computes a step of `h` s of order 4 ([`runge_kutta`]) under `drive`, what acts as a function of the time since its
+    /// beginning; [`Self::accept`] takes it. The present accelerations must be consistent with what acts
+    /// ([`Self::accelerate`]). For a rod that neither shears nor stretches, clamped at its base and free at its tip.
+    ///
+    /// `accuracy` is the displacement of the centreline, over the length, that an iteration need not resolve.
+    ///
+    /// # Errors
+    /// [`Diverged`]; nothing has changed.
+    pub fn attempt(&mut self, drive: &impl Fn(f64) -> Boundary, h: f64, accuracy: f64) -> Result<Attempt, Diverged> {
+        let weight = 1.0 / (runge_kutta::GAMMA * h);
+        let time = Time::Stage { weight };
+        self.old.copy_from(&self.state);
+        self.trial.copy_from(&self.state);
+        let begin = drive(0.0);
+        self.take_rates(0, weight);
+        let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * runge_kutta::weight(0));
+        let mut iterations = 0;
+        for i in 1..runge_kutta::STAGES {
+            let boundary = drive(runge_kutta::C[i] * h);
+            self.prepare_stage(i, h, weight, &boundary);
+            iterations += self
+                .stage(&boundary, &time, accuracy)
+                .map_err(|diverged| Diverged { iterations: iterations + diverged.iterations, ..diverged })?;
+            self.trial.settle(&self.mesh, &self.rod, &self.old, &boundary, &time);
+            self.take_rates(i, weight);
+            work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * runge_kutta::weight(i));
+        }
+        let error = self.error(h);
+        if !(self.trial.is_finite() && error.is_finite()) {
+            return Err(Diverged { iterations, residual: error, reason: Reason::NotFinite });
+        }
+        Ok(Attempt { iterations, error, work })
+    }
+
+    /// Makes the attempted step the present state.
+    pub fn accept(&mut self) {
+        std::mem::swap(&mut self.state, &mut self.trial);
+    }
+
+    /// What the stages before stage `i` give of its coordinates, and a guess of it.
+    fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary) {
+        let Self { mesh, old, trial, stages, .. } = self;
+        // θ_tt goes on as between the two stages before
+        let c = &runge_kutta::C;
+        let last = i - 1;
+        let (before, on) = if i > 1 { (i - 2, (c[i] - c[last]) / (c[last] - c[i - 2])) } else { (0, 0.0) };
+        for (m, rates) in stages.iter().enumerate() {
+            let memory = &mut old.memory[m];
+            let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
+            for (j, Rates { theta_t, theta_tt, kappa_t }) in rates[..i].iter().enumerate() {
+                let a = h * runge_kutta::A[i][j];
+                known.theta += theta_t * a;
+                known.rate += theta_tt * a;
+                known.kappa += kappa_t * a;
+            }
+            memory.known = known;
+            let theta_tt = rates[last].theta_tt + (rates[last].theta_tt - rates[before].theta_tt) * on;
+            let theta = known.theta + (known.rate + theta_tt / weight) / weight;
+            if let (Some(point), Some(begin)) = (trial.points.get_mut(m), old.points.get(m)) {
+                point.rotation = begin.rotation * so3::exp(&theta);
+            }
+        }
+        trial.carry_nodes(mesh, &boundary.base.rotation);
+    }
+
+    /// Newton from the guess in `trial` to the stage, in `trial`.
+    fn stage(&mut self, boundary: &Boundary, time: &Time, accuracy: f64) -> Result<usize, Diverged> {
+        let Self { mesh, rod, system, sweep, old, trial, .. } = self;
+        let (scales, rounding) = scales(mesh, rod, old, boundary, time);
+        // an increment leaves an error of at most its tenth: what the Jacobian leaves out, or its square
+        let tolerance = (10.0 * accuracy).clamp(TOLERANCE, 1e-2);
+        let mut residual = f64::INFINITY;
+        for iteration in 1..=MAX_STAGE_ITERATIONS {
+            let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
+            pose::assemble(mesh, rod, old, trial, boundary, time, system);
+            residual = system.residuals.largest(&scales);
+            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
+            let largest = Largest::of(sweep);
+            if !(residual + largest.turn + largest.force + largest.moment).is_finite() {
+                return Err(diverged(residual, Reason::NotFinite));
+            }
+            trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / largest.turn).min(1.0), time.row());
+            if largest.turn < tolerance && largest.force < (tolerance * scales.force).max(ROUNDINGS * rounding) {
+                return Ok(iteration);
+            }
+        }
+        Err(Diverged { iterations: MAX_STAGE_ITERATIONS, residual, reason: Reason::TooManyIterations })
+    }
+
+    /// The rates of the coordinates at stage `i`, which is settled in `trial`.
+    fn take_rates(&mut self, i: usize, weight: f64) {
+        let Self { old, trial, stages, .. } = self;
+        for (m, rates) in stages.iter_mut().enumerate() {
+            let memory = &trial.memory[m];
+            rates[i] = if i == 0 {
+                // θ = 0: θ_t = ω, θ_tt = ω_t
+                Rates {
+                    theta_t: memory.spin.velocity.value,
+                    theta_tt: memory.spin.acceleration.value,
+                    kappa_t: memory.strain.velocity.value,
+                }
+            } else {
+                let known = &old.memory[m].known;
+                let theta = so3::log(&old.remembering(m).rotation.tr_mul(&trial.remembering(m).rotation));
+                let theta_t = (theta - known.theta) * weight;
+                Rates { theta_t, theta_tt: (theta_t - known.rate) * weight, kappa_t: memory.strain.velocity.value }
+            };
+        }
+    }
+
+    /// How far the difference of the step and the embedded one moves a node, over the length.
+    fn error(&self, h: f64) -> f64 {
+        let Self { mesh, old, stages, .. } = self;
+        let mut way = Vector3::zeros();
+        let mut most = 0.0f64;
+        let per_cell = mesh.rule.stages;
+        for (m, (section, rates)) in old.points.iter().zip(stages).enumerate() {
+            let theta = rates
+                .iter()
+                .enumerate()
+                .fold(Vector3::zeros(), |sum, (j, rates)| sum + rates.theta_t * (h * runge_kutta::error_weight(j)));
+            let length = mesh.cells[m / per_cell].length * mesh.rule.b[m % per_cell];
+            way += section.rotation * theta.cross(&Vector3::z()) * length;
+            if m % per_cell == per_cell - 1 {
+                most = larger(most, way.norm());
+            }
+        }
+        most / mesh.length()
+    }
+
     fn solve(&mut self, boundary: &Boundary, time: &Time) -> Result<Report, Diverged> {
         let full = self.newton(boundary, time, 1.0, MAX_ITERATIONS);
         let result = match full {
@@ -248,18 +428,13 @@ impl Stepper {
         for iteration in 1..=max_iterations {
             let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
             pose::assemble(mesh, rod, old, trial, boundary, time, system);
-            residual = system.residual(&scales);
+            residual = system.residuals.largest(&scales);
             if !residual.is_finite() {
                 return Err(diverged(residual, Reason::NotFinite));
             }
             sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
 
-            let (mut turn, mut force, mut moment) = (0.0f64, 0.0f64, 0.0f64);
-            for delta in sweep.nodes.iter().chain(&sweep.points) {
-                turn = turn.max(delta.phi.norm());
-                force = force.max(delta.n.amax());
-                moment = moment.max(delta.m.amax());
-            }
+            let Largest { turn, force, moment } = Largest::of(sweep);
             if !(turn + force + moment).is_finite() {
                 return Err(diverged(residual, Reason::NotFinite));
             }
@@ -338,11 +513,11 @@ impl Stepper {
     pub fn linear_statics(
         &mut self,
         boundary: &Boundary,
-        load: impl Fn(&Mesh, &Rod, &State, &mut System),
+        load: impl Fn(&Mesh, &Rod, &State, &mut Residuals),
     ) -> Result<(&[Increment], &[Increment]), Diverged> {
         let Self { mesh, rod, state, system, sweep, .. } = self;
         pose::assemble(mesh, rod, state, state, boundary, &Time::Static, system);
-        load(mesh, rod, state, system);
+        load(mesh, rod, state, &mut system.residuals);
         sweep.solve(system).map_err(singular)?;
         Ok((&sweep.nodes, &sweep.points))
     }
@@ -357,16 +532,31 @@ impl Stepper {
         if self.rod.is_extensible() {
             return Ok(());
         }
+        self.solve_accelerations(boundary)?;
+        pose::assemble_jerks(&self.mesh, &self.rod, &mut self.trial, &self.sweep, &mut self.system);
+        self.sweep.solve(&self.system).map_err(singular)?;
+        self.trial.take_jerks(&self.rod, &self.sweep.nodes, &self.sweep.points);
+        std::mem::swap(&mut self.state, &mut self.trial);
+        Ok(())
+    }
+
+    /// Consistent accelerations as [`Self::start`], without their rates: where what acts has jumped.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Self::start`].
+    pub fn accelerate(&mut self, boundary: &Boundary) -> Result<(), Diverged> {
+        self.solve_accelerations(boundary)?;
+        self.trial.dt = 0.0;
+        std::mem::swap(&mut self.state, &mut self.trial);
+        Ok(())
+    }
+
+    fn solve_accelerations(&mut self, boundary: &Boundary) -> Result<(), Diverged> {
         self.trial.copy_from(&self.state);
         self.trial.boundary = *boundary;
         pose::assemble_accelerations(&self.mesh, &self.rod, &mut self.trial, boundary, &mut self.system);
         self.sweep.solve(&self.system).map_err(singular)?;
         self.trial.take_accelerations(&self.rod, &self.sweep.nodes, &self.sweep.points);
-
-        pose::assemble_jerks(&self.mesh, &self.rod, &mut self.trial, &self.sweep, &mut self.system);
-        self.sweep.solve(&self.system).map_err(singular)?;
-        self.trial.take_jerks(&self.rod, &self.sweep.nodes, &self.sweep.points);
-        std::mem::swap(&mut self.state, &mut self.trial);
         Ok(())
     }
 }
@@ -392,6 +582,10 @@ fn scales(mesh: &Mesh, rod: &Rod, old: &State, boundary: &Boundary, time: &Time)
             let weight = scheme.rate_weight(*dt).powi(2);
             let inertia = rod.mass_per_length * length * length * weight;
             (if *row == Row::Positions { length } else { length * weight }, inertia)
+        }
+        Time::Stage { weight } => {
+            let weight = weight * weight;
+            (length * weight, rod.mass_per_length * length * length * weight)
         }
     };
     let rounding = f64::EPSILON * (stiffness / (finest * finest) + inertia + force);

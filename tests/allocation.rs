@@ -4,11 +4,13 @@
 #![allow(unsafe_code)]
 
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::{Boundary, Held, Support};
+use cosserat_rod::boundary::{Boundary, Drive, Held, Rates, Support};
 use cosserat_rod::mesh::Mesh;
+use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rate;
 use cosserat_rod::rod::Rod;
+use cosserat_rod::rosenbrock::{RODAS4, RODAS5P};
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -129,4 +131,30 @@ fn a_communication_step_allocates_nothing() {
         }
     });
     assert_eq!(count, 0);
+}
+
+#[test]
+fn a_plane_rod_allocates_nothing_once_built() {
+    let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
+    let boundary = Boundary {
+        tip_force: Vector3::new(0.1, 0.0, 0.0),
+        ..Boundary::hanging_from(base, Vector3::new(9.81, 0.0, 0.0))
+    };
+    let drive = Drive { boundary, rates: Rates::default() };
+    let rod = Rod { tip_mass: 0.01, tip_inertia: 1e-6, ..Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0) };
+    for method in [&RODAS4, &RODAS5P] {
+        for stages in 1..=4 {
+            let mesh = Mesh::uniform(1.0, 3, stages, Vector3::zeros());
+            let mut plane = Plane::of(&mesh, &rod, &drive, method).expect("a plane rod");
+            let count = allocations(|| {
+                plane.start(&drive).unwrap();
+                plane.attempt(&|_| drive, 1e-3).unwrap();
+                plane.accept();
+                plane.look(0.5, &drive);
+                std::hint::black_box((plane.tip(), plane.reaction(), plane.position(0.7)));
+                std::hint::black_box((plane.energy(), plane.power(), plane.holds(&drive)));
+            });
+            assert_eq!(count, 0, "{stages} stages");
+        }
+    }
 }

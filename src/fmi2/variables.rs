@@ -271,7 +271,7 @@ pub static ROWS: &[Row] = &[
     scalar("stages", "", IntegerParameter(|p| &mut p.stages),
         "Gauss points in a cell, 1 to 4; 0 = chosen by the unit"),
     scalar("step", "s", Parameter(|p, _| &mut p.step),
-        "Every communication step is divided into equal steps not longer than this; 0 = chosen by the unit"),
+        "Every communication step is divided into equal generalized-alpha steps not longer than this; 0 = steps of order 4, as long as their error allows"),
     scalar("tolerance", "", Parameter(|p, _| &mut p.tolerance),
         "Tolerance of the tip position relative to the length; 0 = that of the experiment, else 1e-3"),
     scalar("spectral_radius", "", Parameter(|p, _| &mut p.spectral_radius),
@@ -327,6 +327,12 @@ pub static ROWS: &[Row] = &[
         "Internal steps tried again since the start"),
     scalar("solver.cells", "", IntegerOutput(|o| o.cells, START),
         "Cells in use"),
+    scalar("solver.order", "", IntegerOutput(|o| o.order, Initially::Constant),
+        "Order in time of the last internal step; 0 before the first"),
+    scalar("solver.step", "s", Output(|o, _| o.step, Initially::Constant),
+        "Length of the last internal step"),
+    scalar("solver.error_estimate", "", Output(|o, _| o.error_estimate, Initially::Constant),
+        "Sum of the internal steps' estimated errors of the centreline since the start, over the length; 0 where the parameter step gives their length"),
 ];
 
 /// The units of the table, each with its exponents of kg, m, s and rad.

@@ -1,0 +1,160 @@
+//! A Runge-Kutta method of high order and the choice of its steps. It knows numbers and no rod.
+//!
+//! ```text
+//! Yᵢ = y₀ + h Σ_{j≤i} aᵢⱼ Y'ⱼ          a₁₁ = 0, aᵢᵢ = γ          y₁ = Y_s
+//! ```
+//!
+//! The first stage is the beginning of the step, every other one an implicit equation of the kind that one step of
+//! implicit Euler solves. The second stage and all later ones are of order 2 in themselves, so that what is too stiff to
+//! be followed does not spoil the order of the rest; the last one is the step (stiffly accurate) and the method is
+//! L-stable: what it cannot follow rests. Applied to x' = v and v' = a in turn it gives both rates of a stage from its x,
+//!
+//! ```text
+//! v = w (x − x₀ − h Σ_{j<i} aᵢⱼ vⱼ)      a = w (v − v₀ − h Σ_{j<i} aᵢⱼ aⱼ)      w = 1/(γ h)
+//! ```
+
+use std::f64::consts::SQRT_2;
+
+/// s, the explicit first stage included.
+pub const STAGES: usize = 6;
+/// Order of the step.
+pub const ORDER: i32 = 4;
+/// γ.
+pub const GAMMA: f64 = 0.25;
+
+/// aᵢⱼ, j < i, of `ESDIRK4(3)6L[2]SA`: C. A. Kennedy, M. H. Carpenter: Diagonally Implicit Runge-Kutta Methods for Ordinary
+/// Differential Equations, a Review, NASA/TM-2016-219173, table 16.
+pub const A: [[f64; STAGES]; STAGES] = [
+    [0.0; STAGES],
+    [0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
+    [(1.0 - SQRT_2) / 8.0, (1.0 - SQRT_2) / 8.0, 0.0, 0.0, 0.0, 0.0],
+    [(5.0 - 7.0 * SQRT_2) / 64.0, (5.0 - 7.0 * SQRT_2) / 64.0, 7.0 * (1.0 + SQRT_2) / 32.0, 0.0, 0.0, 0.0],
+    [
+        (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
+        (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
+        (506_605.0 + 132_109.0 * SQRT_2) / 437_500.0,
+        166.0 * (-97.0 + 376.0 * SQRT_2) / 109_375.0,
+        0.0,
+        0.0,
+    ],
+    [
+        (1181.0 - 987.0 * SQRT_2) / 13_782.0,
+        (1181.0 - 987.0 * SQRT_2) / 13_782.0,
+        47.0 * (-267.0 + 1783.0 * SQRT_2) / 273_343.0,
+        -16.0 * (-22_922.0 + 3525.0 * SQRT_2) / 571_953.0,
+        -15_625.0 * (97.0 + 376.0 * SQRT_2) / 90_749_876.0,
+        0.0,
+    ],
+];
+
+/// cᵢ: where in the step the stages stand.
+pub const C: [f64; STAGES] = [0.0, 0.5, (2.0 - SQRT_2) / 4.0, 0.625, 1.04, 1.0];
+
+/// The weights of an embedded step of order 3 (same source).
+const EMBEDDED: [f64; STAGES] = [
+    -480_923_228_411.0 / 4_982_971_448_372.0,
+    -480_923_228_411.0 / 4_982_971_448_372.0,
+    6_709_447_293_961.0 / 12_833_189_095_359.0,
+    3_513_175_791_894.0 / 6_748_737_351_361.0,
+    -498_863_281_070.0 / 6_042_575_550_617.0,
+    2_077_005_547_802.0 / 8_945_017_530_137.0,
+];
+
+/// Weight of Y'ⱼ in the step.
+pub fn weight(j: usize) -> f64 {
+    if j == STAGES - 1 { GAMMA } else { A[STAGES - 1][j] }
+}
+
+/// Weight of Y'ⱼ in the difference of the step and the embedded one, which estimates the latter's error.
+pub fn error_weight(j: usize) -> f64 {
+    weight(j) - EMBEDDED[j]
+}
+
+/// Part of the step that the estimate would allow which is taken, so that few are refused.
+const SAFETY: f64 = 0.9;
+/// Bounds of the change from one step to the next.
+const CHANGE: (f64, f64) = (0.2, 4.0);
+
+/// How much longer the next step may be than one with the error `part`, as a part of what is allowed; steps are allowed
+/// errors in proportion to their length.
+pub fn stretch(part: f64) -> f64 {
+    // the estimate goes with h⁴, what is allowed with h
+    (SAFETY * part.max(1e-12).powf(-1.0 / 3.0)).clamp(CHANGE.0, CHANGE.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// aᵢⱼ with the diagonal.
+    fn a(i: usize, j: usize) -> f64 {
+        if i == j && i > 0 { GAMMA } else { A[i][j] }
+    }
+
+    fn times(x: &[f64; STAGES]) -> [f64; STAGES] {
+        std::array::from_fn(|i| (0..STAGES).map(|j| a(i, j) * x[j]).sum())
+    }
+
+    #[test]
+    fn conditions_of_order_hold() {
+        let one = [1.0; STAGES];
+        let by = |x: &[f64; STAGES], y: &[f64; STAGES]| -> [f64; STAGES] { std::array::from_fn(|i| x[i] * y[i]) };
+        let ac = times(&C);
+        let c2 = by(&C, &C);
+        // the trees of order 1 to 3, then of order 4
+        let trees = [
+            (one, 1.0),
+            (C, 2.0),
+            (c2, 3.0),
+            (ac, 6.0),
+            (by(&c2, &C), 4.0),
+            (by(&C, &ac), 8.0),
+            (times(&c2), 12.0),
+            (times(&ac), 24.0),
+        ];
+        for (n, (tree, order)) in trees.iter().enumerate() {
+            let sum: f64 = (0..STAGES).map(|j| weight(j) * tree[j]).sum();
+            let embedded: f64 = (0..STAGES).map(|j| EMBEDDED[j] * tree[j]).sum();
+            // roundings of coefficients of size 1
+            assert!((sum - 1.0 / order).abs() < 1e-14, "tree {n}");
+            assert_eq!((embedded - 1.0 / order).abs() < 1e-14, n < 4, "embedded, tree {n}");
+        }
+        for i in 1..STAGES {
+            // stages of order 2
+            assert!((times(&one)[i] - C[i]).abs() < 1e-14 && (ac[i] - 0.5 * c2[i]).abs() < 1e-14, "stage {i}");
+        }
+    }
+
+    #[test]
+    fn it_damps_what_it_cannot_follow_and_nothing_grows() {
+        // |R(iy)| of y' = i y: stages by forward substitution in complex numbers
+        let factor = |y: f64| {
+            let mut rates = [(0.0, 0.0); STAGES];
+            let mut last = (1.0, 0.0);
+            for i in 0..STAGES {
+                let mut known = (1.0, 0.0);
+                for j in 0..i {
+                    known = (known.0 + A[i][j] * rates[j].0, known.1 + A[i][j] * rates[j].1);
+                }
+                let d = if i == 0 { 0.0 } else { GAMMA * y };
+                // Y = known / (1 − i d)
+                let scale = 1.0 / (1.0 + d * d);
+                last = ((known.0 - d * known.1) * scale, (known.1 + d * known.0) * scale);
+                rates[i] = (-y * last.1, y * last.0);
+            }
+            f64::hypot(last.0, last.1)
+        };
+        for step in 1..2000 {
+            let y = 1.02f64.powi(step - 1000);
+            assert!(factor(y) <= 1.0 + 1e-12, "{y}: {}", factor(y));
+        }
+        assert!(factor(1e8) < 1e-6);
+    }
+
+    #[test]
+    fn steps_follow_their_error() {
+        assert_eq!(stretch(0.0), CHANGE.1);
+        assert_eq!(stretch(1e30), CHANGE.0);
+        assert!((stretch(1.0) - SAFETY).abs() < 1e-15);
+    }
+}
