@@ -31,6 +31,8 @@ enum Command {
     Simulate(cli::simulate::Arguments),
     /// Prints the natural frequencies of the rod about its static equilibrium.
     Modes(cli::modes::Arguments),
+    /// Charts error against CPU time, and says which settings to use for which accuracy.
+    Chart(cli::chart::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -55,6 +57,7 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
         Command::Demo(arguments) => cli::demo::run(&arguments),
         Command::Simulate(arguments) => cli::simulate::run(&arguments),
         Command::Modes(arguments) => cli::modes::run(&arguments),
+        Command::Chart(arguments) => cli::chart::run(&arguments),
     }
 }
 

@@ -66,7 +66,7 @@ fn simulate_runs_the_default_experiment() {
     let times = column(&table, "time");
     assert_eq!(times.len(), 1 + (STOP_TIME / STEP_SIZE).round() as usize);
     assert_eq!((times[0], times[times.len() - 1]), (0.0, STOP_TIME));
-    assert_eq!(table.len(), 1 + 13 + 6 + 33 + 6 + 4);
+    assert_eq!(table.len(), 1 + 13 + 6 + 33 + 6 + 7);
     assert!(table.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())));
     let height = column(&table, "tip.position[3]");
     assert!(height[0].abs() < 1e-12 && height[height.len() - 1] < -0.3);
@@ -255,4 +255,99 @@ fn demo_drives_the_unit_out_of_its_archive_and_draws_it() {
         assert!(picture.contains(name), "{name}");
     }
     assert!(!picture.contains("NaN"));
+}
+
+/// The errors of the front that a chart prints, over CPU times that rise.
+fn front(text: &str) -> Vec<f64> {
+    let rows = text.lines().skip_while(|line| !line.contains("front of")).skip(1).take_while(|line| !line.is_empty());
+    let tips = rows.filter(|row| row.contains(" both ") || row.contains(" tip "));
+    tips.map(|row| row.split_whitespace().nth(2).unwrap().parse().unwrap()).collect()
+}
+
+/// As far as two digits show.
+fn falls(errors: &[f64]) -> bool {
+    errors.len() > 2 && errors.windows(2).all(|pair| pair[1] <= pair[0]) && errors[errors.len() - 1] < errors[0]
+}
+
+/// The least time in which a front has more than a point.
+const TINY: [&str; 2] = ["--budget", "0.5"];
+
+#[test]
+fn chart_measures_a_scene_and_draws_it() {
+    let directory = directory("chart");
+    let list = cosserat(&directory, &["chart"]);
+    assert!(list.lines().count() == 7 && list.starts_with("rope "), "{list}");
+
+    let header = "scene,code,kind,setting,cpu_s,tip_error,reaction_error";
+    // a code that is as exact as one likes in an hour, and one that is fast and coarse
+    let others = format!(
+        "{header}\nspin,slow,spatial,fine,3600,1e-9,1e-9\nspin,strain modes (RK4),spatial,coarse,1e-6,2e-3,\n\
+         spin,slow,spatial,n=1 (failed at t=0.1),1,,\nrope,slow,spatial,fine,3600,1e-9,\n"
+    );
+    fs::write(directory.join("others.csv"), others).unwrap();
+    let with = ["--with", "others.csv", "--overview", "pictures/all.svg"];
+    let text = cosserat(&directory, &[&["chart", "spin"][..], &TINY, &with].concat());
+    assert!(text.contains("errors against the finest run") && text.contains("left out for the budget"), "{text}");
+    assert!(falls(&front(&text)), "{text}");
+
+    let table = fs::read_to_string(directory.join("target/chart/spin.csv")).unwrap();
+    assert_eq!(table.lines().next(), Some(header));
+    assert!(table.lines().skip(1).all(|line| line.starts_with("spin,cosserat-rod order ")), "{table}");
+    for picture in ["target/chart/spin.svg", "pictures/all.svg"] {
+        let picture = fs::read_to_string(directory.join(picture)).unwrap();
+        assert!(picture.starts_with("<svg ") && picture.contains("strain modes") && !picture.contains("NaN"));
+    }
+    assert!(fs::read(directory.join("target/chart/spin.png")).unwrap().starts_with(b"\x89PNG"));
+
+    let ratios = fs::read_to_string(directory.join("target/chart/ratios.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = ratios.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0], ["scene", "measure", "level", "cpu_s", "kind", "code", "code_cpu_s", "ratio"]);
+    let row = |measure: &str, level: &str, code: &str| {
+        rows.iter().find(|row| row[1] == measure && row[2] == level && row[5] == code)
+    };
+    let slow = row("tip", "1e-2", "slow").unwrap();
+    let (ours, theirs, ratio): (f64, f64, f64) =
+        (slow[3].parse().unwrap(), slow[6].parse().unwrap(), slow[7].parse().unwrap());
+    assert!(theirs == 3600.0 && (ratio * ours / theirs - 1.0).abs() < 1e-2, "{slow:?}");
+    assert_eq!(row("tip", "1e-2", "strain modes (RK4)").unwrap()[6], "1.000e-6");
+    // not as exact as that, and without a reaction
+    assert!(row("tip", "1e-3", "strain modes (RK4)").is_none());
+    assert!(row("reaction", "1e-2", "strain modes (RK4)").is_none() && row("reaction", "1e-2", "slow").is_some());
+    assert!(rows[1..].iter().all(|row| row[0] == "spin"), "{ratios}");
+}
+
+#[test]
+fn chart_takes_a_rod_and_inputs_of_ones_own() {
+    let directory = directory("chart_own");
+    let row = |k: u32| format!("{},{}\n", 0.02 * f64::from(k), 0.01 * f64::from(k));
+    fs::write(directory.join("pull.csv"), format!("time,tip.force[2]\n{}", (0..11).map(row).collect::<String>()))
+        .unwrap();
+    let set = ["--set", "length=0.5", "--set", "stages=2"];
+    let text = cosserat(&directory, &[&["chart", "--inputs", "pull.csv"][..], &set, &TINY].concat());
+    assert!(falls(&front(&text)), "{text}");
+    let table = fs::read_to_string(directory.join("target/chart/pull.csv")).unwrap();
+    assert!(table.lines().skip(1).all(|line| line.contains("tolerance=") || line.contains("stages=2 ")), "{table}");
+}
+
+#[test]
+fn chart_says_what_is_wrong() {
+    let directory = directory("chart_wrong");
+    fs::write(directory.join("table.csv"), "time,tip\n0,1\n").unwrap();
+    fs::write(directory.join("rope.json"), "{\"scene\":\"rope\"}").unwrap();
+    fs::write(directory.join("one.csv"), "time\n0\n").unwrap();
+    let cases: [(&[&str], &str); 9] = [
+        (&["rop"], "rop is no scene: rope, wire, pulse, spring, hair, spin, umbilical, or all"),
+        (&["rope", "--with", "none.csv"], "none.csv: "),
+        (&["rope", "--with", "table.csv"], "table.csv: the header is not scene,code,kind,setting,cpu_s"),
+        (&["rope", "--reference", "none.json"], "none.json: "),
+        (&["wire", "--reference", "rope.json"], "rope.json: not of the scene wire"),
+        (&["all", "--reference", "rope.json"], "--reference is of one scene, not of all"),
+        (&["rope", "--budget", "0"], "--budget 0 is not allowed: finite and > 0"),
+        (&["--inputs", "none.csv"], "none.csv: "),
+        (&["--inputs", "one.csv"], "one.csv: one row only, nothing moves"),
+    ];
+    for (arguments, expected) in cases {
+        let error = refusal(&directory, &[&["chart"][..], arguments].concat());
+        assert!(error.starts_with(&format!("cosserat: {expected}")), "{error}");
+    }
 }

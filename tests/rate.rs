@@ -2,7 +2,9 @@
 #![allow(missing_docs)]
 
 mod common;
-#[path = "common/scenes.rs"]
+// every test file takes the part it needs
+#[allow(dead_code)]
+#[path = "../src/cli/chart/scenes.rs"]
 mod scenes;
 
 use common::{along_x, hair, rubber};
@@ -83,7 +85,7 @@ fn distance(scene: Scene, cells: usize, dt: f64) -> f64 {
 
 #[test]
 fn the_tip_of_the_other_formulation_is_approached_at_second_order() {
-    for scene in [Scene::S1, Scene::S2, Scene::S3] {
+    for scene in [Scene::Rope, Scene::Wire, Scene::Pulse] {
         let [coarse, fine] = [(20, 5e-3), (40, 2.5e-3)].map(|(cells, dt)| distance(scene, cells, dt));
         // four times smaller, short of what the release of S1 loses in its first step
         assert!(fine < 0.3 * coarse && fine < 2e-3, "{scene:?}: {coarse:.2e}, {fine:.2e}");

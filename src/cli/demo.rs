@@ -12,7 +12,6 @@ use cosserat_rod::unit::STATIONS;
 use nalgebra::Vector3;
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -20,7 +19,7 @@ use std::time::{Duration, Instant};
 /// Where the picture goes.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Where to write the picture.
+    /// Where to write the picture, SVG or (where the name ends in .png) PNG.
     #[arg(short, long, default_value = "target/demo.svg")]
     output: PathBuf,
 }
@@ -83,11 +82,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     slave.log.take().iter().for_each(|line| println!("log: {}", line.text));
 
     let subtitle = format!("its clamp is shaken sideways, a pulse of force hits the tip at {PULSE_TIME} s");
-    let svg = picture::draw(&frames, &subtitle)?;
-    if let Some(directory) = arguments.output.parent() {
-        fs::create_dir_all(directory).map_err(|error| format!("{}: {error}", directory.display()))?;
-    }
-    fs::write(&arguments.output, svg).map_err(|error| format!("{}: {error}", arguments.output.display()))?;
+    picture::draw(&frames, &subtitle)?.write(&arguments.output)?;
     println!("{}", arguments.output.display());
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! The picture of the demo: shapes over time in space, and the curves over time.
 
+use super::page::{Area, BLUE, Fallible, GREEN, INK, ORANGE, PALE, Page, RED, VIOLET, font, line, px};
 use cosserat_rod::unit::STATIONS;
 use nalgebra::Vector3;
-use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::colors::colormaps::ViridisRGB;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -42,39 +42,9 @@ impl Frame {
 /// On the page.
 const WIDTH: u32 = 1200;
 const HEIGHT: u32 = 660;
-/// The backend rounds to whole units of this fraction of a page unit.
-const FINE: u32 = 5;
-
-const INK: RGBColor = RGBColor(40, 44, 52);
-const PALE: RGBColor = RGBColor(205, 209, 216);
-const BLUE: RGBColor = RGBColor(31, 110, 190);
-const ORANGE: RGBColor = RGBColor(225, 110, 20);
-const GREEN: RGBColor = RGBColor(30, 145, 90);
-const RED: RGBColor = RGBColor(200, 45, 60);
-const VIOLET: RGBColor = RGBColor(125, 75, 175);
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Fallible = Result<(), Box<dyn Error>>;
-
-/// Length on the page.
-fn px(length: f64) -> i32 {
-    (length * f64::from(FINE)) as i32
-}
-
-fn font(size: f64, color: RGBColor) -> TextStyle<'static> {
-    ("Helvetica, Arial, sans-serif", px(size)).into_font().color(&color)
-}
-
-fn line(color: RGBColor, width: f64) -> ShapeStyle {
-    color.stroke_width(px(width) as u32)
-}
-
-/// The text of an SVG.
-pub fn draw(frames: &[Frame], subtitle: &str) -> Result<String, Box<dyn Error>> {
-    let mut svg = String::new();
-    {
-        let page = SVGBackend::with_string(&mut svg, (WIDTH * FINE, HEIGHT * FINE)).into_drawing_area();
-        page.fill(&WHITE)?;
+/// The picture.
+pub fn draw(frames: &[Frame], subtitle: &str) -> Result<Page, Box<dyn Error>> {
+    Page::draw(WIDTH, HEIGHT, |page| {
         let (space, curves) = page.split_horizontally(px(612.0));
         shapes(&space, frames, subtitle)?;
         let panels = curves.split_evenly((3, 1));
@@ -93,12 +63,8 @@ pub fn draw(frames: &[Frame], subtitle: &str) -> Result<String, Box<dyn Error>> 
             ("lost", RED, energy(&|frame| frame.dissipated)),
             ("work done", VIOLET, energy(&|frame| frame.work)),
         ];
-        chart(&panels[2], end, "energy since the start, J", energies)?;
-        page.present()?;
-    }
-    // the fine units stay inside
-    let size = |scale: u32| format!("width=\"{}\" height=\"{}\"", WIDTH * scale, HEIGHT * scale);
-    Ok(svg.replacen(&size(FINE), &size(1), 1))
+        chart(&panels[2], end, "energy since the start, J", energies)
+    })
 }
 
 /// Curves over time, each with its name at its end.

@@ -7,7 +7,7 @@
 use super::{Error as ValueError, Progress};
 use cosserat_rod::fmi2::description::{STEP_SIZE, STOP_TIME};
 use cosserat_rod::fmi2::variables::{self, Kind, Slot, Variable};
-use cosserat_rod::unit::{self, Inputs, Outputs, Parameters, Unit};
+use cosserat_rod::unit::{self, Inputs, Outputs, Parameters, Unit, Warning};
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -225,11 +225,73 @@ impl Points {
     }
 }
 
+/// A rod, its inputs over time, and the communication points.
+pub struct Experiment {
+    /// Of the rod.
+    pub parameters: Parameters,
+    inputs: Inputs,
+    table: Option<Table>,
+    points: Points,
+}
+
+impl Experiment {
+    /// From what the command line gives: a table, settings, the end and the communication step.
+    pub fn new(
+        table: Option<&Path>,
+        set: &[String],
+        stop: Option<f64>,
+        step: Option<f64>,
+    ) -> Result<Self, Box<dyn error::Error>> {
+        let (parameters, inputs) = super::settings(set)?;
+        let table = table.map(Table::read).transpose()?;
+        let points = Points::new(table.as_ref(), stop, step)?;
+        Ok(Self { parameters, inputs, table, points })
+    }
+
+    /// How many communication steps there are.
+    pub fn steps(&self) -> usize {
+        self.points.count()
+    }
+
+    /// From the first communication point to the last, s.
+    pub fn duration(&self) -> f64 {
+        self.points.time(self.points.count()) - self.points.time(0)
+    }
+
+    /// Runs the unit with `parameters`; `tell` gets what it says at every communication point.
+    pub fn run(
+        &self,
+        parameters: &Parameters,
+        mut tell: impl FnMut(f64, &Outputs, Option<Warning>) -> Result<(), Box<dyn error::Error>>,
+    ) -> Result<(), Box<dyn error::Error>> {
+        let (mut parameters, mut inputs) = (parameters.clone(), self.inputs.clone());
+        let mut apply = |time: f64, parameters: &mut Parameters| {
+            if let Some(table) = &self.table {
+                table.apply(time, parameters, &mut inputs);
+            }
+            inputs.clone()
+        };
+        let start = apply(self.points.time(0), &mut parameters);
+        let mut unit = Unit::new(&parameters, &start, None).map_err(Error::Start)?;
+        tell(self.points.time(0), unit.outputs(), None)?;
+        let mut clock = self.points.time(0);
+        for k in 0..self.points.count() {
+            let (time, end) = (self.points.time(k), self.points.time(k + 1));
+            // as the FMU takes a host's rounded times: its own clock goes on from where it is
+            let step = (time - clock) + (end - time);
+            clock = time + (end - time);
+            let now = apply(time, &mut parameters);
+            unit.set_gravity(parameters.gravity);
+            let warning = unit.advance(&now, step).map_err(|error| Error::Diverged { time, error })?;
+            tell(end, unit.outputs(), warning)?;
+        }
+        Ok(())
+    }
+}
+
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn error::Error>> {
-    let (mut parameters, mut inputs) = super::settings(&arguments.set)?;
-    let table = arguments.inputs.as_deref().map(Table::read).transpose()?;
-    let points = Points::new(table.as_ref(), arguments.stop, arguments.step)?;
+    let experiment = Experiment::new(arguments.inputs.as_deref(), &arguments.set, arguments.stop, arguments.step)?;
     let columns = outputs(&arguments.output)?;
     let sink: Box<dyn Write> = match &arguments.out {
         Some(path) => Box::new(File::create(path).map_err(|error| Error::File { path: path.clone(), error })?),
@@ -238,38 +300,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn error::Error>> {
     let mut writer = csv::Writer::from_writer(sink);
     let header = columns.iter().map(Variable::to_string);
     writer.write_record(["time".to_owned()].into_iter().chain(header))?;
-    let mut write = |time: f64, outputs: &Outputs| {
-        let values = columns.iter().map(|column| text(column, outputs));
-        writer.write_record([format!("{time:?}")].into_iter().chain(values))
-    };
-
-    let mut apply = |time: f64, parameters: &mut Parameters| {
-        if let Some(table) = &table {
-            table.apply(time, parameters, &mut inputs);
-        }
-        inputs.clone()
-    };
-    let start = apply(points.time(0), &mut parameters);
-    let mut unit = Unit::new(&parameters, &start, None).map_err(Error::Start)?;
-    write(points.time(0), unit.outputs())?;
     // not into the middle of the table
     let quiet = arguments.out.is_none() && io::stdout().is_terminal();
-    let mut progress = (!quiet).then(|| Progress::new(points.count() as u64));
-    let mut clock = points.time(0);
-    for k in 0..points.count() {
-        let (time, end) = (points.time(k), points.time(k + 1));
-        // as the FMU takes a host's rounded times: its own clock goes on from where it is
-        let step = (time - clock) + (end - time);
-        clock = time + (end - time);
-        let now = apply(time, &mut parameters);
-        unit.set_gravity(parameters.gravity);
-        let warning = unit.advance(&now, step).map_err(|error| Error::Diverged { time, error })?;
+    let mut progress = (!quiet).then(|| Progress::new(experiment.steps() as u64 + 1));
+    experiment.run(&experiment.parameters, |time, outputs, warning| {
         if let Some(warning) = warning {
-            eprintln!("cosserat: at {} s: {warning}", end);
+            eprintln!("cosserat: at {time} s: {warning}");
         }
-        write(end, unit.outputs())?;
+        let values = columns.iter().map(|column| text(column, outputs));
+        writer.write_record([format!("{time:?}")].into_iter().chain(values))?;
         progress.iter_mut().for_each(Progress::step);
-    }
+        Ok(())
+    })?;
     writer.flush()?;
     Ok(())
 }

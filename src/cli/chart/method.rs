@@ -1,0 +1,216 @@
+//! The ways to integrate a rod, each at many resolutions.
+
+use super::scenes::Scene;
+use crate::cli::simulate::Experiment;
+use cosserat_rod::alpha::Scheme;
+use cosserat_rod::mesh::Mesh;
+use cosserat_rod::pose::State;
+use cosserat_rod::stepper::{Diverged, Stepper};
+use cosserat_rod::unit::Parameters;
+use cpu_time::ProcessTime;
+use nalgebra::Vector3;
+use std::error::Error;
+use std::fmt;
+
+type Vec3 = Vector3<f64>;
+
+/// Equal times at which a built-in scene is sampled, besides its start.
+pub const SAMPLES: usize = 100;
+
+/// How finely a rod is resolved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// Equal cells, and equal steps of which so many make an interval between samples.
+    Grid { cells: usize, stages: usize, parts: usize },
+    /// Whatever the unit chooses for it.
+    Tolerance(f64),
+}
+
+impl fmt::Display for Resolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Grid { cells, stages, parts } => write!(f, "cells={cells} stages={stages}, {parts} steps a sample"),
+            Self::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
+        }
+    }
+}
+
+/// What a run gave.
+#[derive(Clone, Default)]
+pub struct Run {
+    /// In the words of `--set`, after the tolerance where that chose the others.
+    pub setting: String,
+    /// Of the process for the steps, s.
+    pub cpu: f64,
+    pub tip: Vec<Vec3>,
+    /// On the base.
+    pub reaction: Vec<Vec3>,
+}
+
+impl Run {
+    fn sample(&mut self, tip: &Vec3, reaction: &Vec3) {
+        self.tip.push(*tip);
+        self.reaction.push(*reaction);
+    }
+}
+
+type Solve<'a> = Box<dyn Fn(Resolution) -> Result<Run, Box<dyn Error>> + 'a>;
+
+/// A way to integrate a rod. A new one is an entry more in [`of_scene`], and is measured, drawn and compared like the
+/// others.
+pub struct Method<'a> {
+    /// Its name in tables.
+    pub code: &'static str,
+    /// All it may be asked for; tolerances from the coarsest on.
+    pub resolutions: Vec<Resolution>,
+    pub solve: Solve<'a>,
+}
+
+/// Those of the built-in scenes: the library under exact motions and loads. The grids of the first give the reference
+/// where there is no other.
+pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
+    let Parameters { length, rest_curvature, .. } = scene.parameters();
+    let grids = grids(&cell_counts(length * rest_curvature.norm()), &STAGES);
+    let solve = move |resolution| of_grid(scene, resolution, generalised_alpha);
+    let runge_kutta = move |resolution| of_grid(scene, resolution, fourth_order);
+    vec![
+        Method { code: "cosserat-rod order 2", resolutions: grids.clone(), solve: Box::new(solve) },
+        Method { code: "cosserat-rod order 4", resolutions: grids, solve: Box::new(runge_kutta) },
+    ]
+}
+
+/// Those of a rod of the user's own: the unit. What is set stays as it is.
+pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
+    let given = &experiment.parameters;
+    let fixed = |value: i32, otherwise: Vec<usize>| if value > 0 { vec![value as usize] } else { otherwise };
+    let cells = fixed(given.cells, cell_counts(given.length * given.rest_curvature.norm()));
+    let mut grids = grids(&cells, &fixed(given.stages, STAGES.to_vec()));
+    if given.step > 0.0 {
+        grids.retain(|resolution| matches!(resolution, Resolution::Grid { parts: 1, .. }));
+    }
+    let tolerances = if given.tolerance > 0.0 { tolerances(&[given.tolerance]) } else { tolerances(&TOLERANCES) };
+    let interval = experiment.duration() / experiment.steps().max(1) as f64;
+    let solve = move |resolution| {
+        let parameters = match resolution {
+            Resolution::Grid { cells, stages, parts } => {
+                let step = if given.step > 0.0 { given.step } else { interval / parts as f64 };
+                Parameters { cells: cells as i32, stages: stages as i32, step, ..given.clone() }
+            }
+            Resolution::Tolerance(tolerance) => Parameters { tolerance, ..given.clone() },
+        };
+        simulate(experiment, &parameters, resolution)
+    };
+    vec![Method { code: "cosserat-rod", resolutions: [tolerances, grids].concat(), solve: Box::new(solve) }]
+}
+
+/// Displacement over the length that an iteration of a stage need not resolve.
+const STAGE_ACCURACY: f64 = 1e-6;
+const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
+const STAGES: [usize; 3] = [1, 2, 4];
+/// Most cells, and twice as many as a wound rod needs at least.
+const CELLS: usize = 32;
+/// Turn of the rest shape in a cell, rad, up to which the unit takes a mesh.
+const CELL_TURN: f64 = 3.0;
+/// Most halvings of the interval between samples.
+const HALVINGS: u32 = 12;
+
+fn tolerances(values: &[f64]) -> Vec<Resolution> {
+    values.iter().copied().map(Resolution::Tolerance).collect()
+}
+
+/// 1, 2, 3, 4, 6, 8, 12 …
+fn sizes() -> impl Iterator<Item = usize> {
+    [1].into_iter().chain((1..).flat_map(|k| [1 << k, 3 << (k - 1)]))
+}
+
+/// Of a rod whose rest shape turns by so much, rad.
+fn cell_counts(turn: f64) -> Vec<usize> {
+    let least = (turn / CELL_TURN).floor() as usize + 1;
+    sizes().take_while(|&cells| cells <= CELLS.max(4 * least)).filter(|&cells| cells >= least).collect()
+}
+
+fn grids(cells: &[usize], stages: &[usize]) -> Vec<Resolution> {
+    let mut grids = Vec::new();
+    for &cells in cells {
+        for &stages in stages {
+            let halvings = (0..=HALVINGS).map(|halvings| 1 << halvings);
+            grids.extend(halvings.map(|parts| Resolution::Grid { cells, stages, parts }));
+        }
+    }
+    grids
+}
+
+/// A mesh and a step, as one gives them to the unit.
+fn grid(cells: usize, stages: usize, step: f64) -> String {
+    format!("cells={cells} stages={stages} step={}", digits(step))
+}
+
+/// Four of them that count.
+fn digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if (1e-3..1e4).contains(&rounded) { format!("{rounded}") } else { format!("{rounded:e}") }
+}
+
+/// A run of a built-in scene on a grid.
+fn of_grid(
+    scene: Scene,
+    resolution: Resolution,
+    advance: impl Fn(&mut Stepper, Scene, f64, f64) -> Result<(), Diverged>,
+) -> Result<Run, Box<dyn Error>> {
+    let Resolution::Grid { cells, stages, parts } = resolution else {
+        return Err(format!("{resolution} is not a grid").into());
+    };
+    let start = scene.boundary(0.0);
+    let Parameters { length, rest_curvature, .. } = scene.parameters();
+    let mesh = Mesh::uniform(length, cells, stages, rest_curvature);
+    let state = State::at_rest_shape(&mesh, &start.base);
+    let mut stepper = Stepper::new(mesh, scene.rod(), state);
+    if scene.starts_at_rest() {
+        stepper.equilibrium(&start)?;
+    }
+    stepper.start(&start)?;
+    let step = scene.duration() / (SAMPLES * parts) as f64;
+    let mut run = Run { setting: grid(cells, stages, step), ..Run::default() };
+    run.sample(&stepper.state.tip().position, &stepper.state.nodes[0].force);
+    let clock = ProcessTime::now();
+    for k in 0..SAMPLES * parts {
+        advance(&mut stepper, scene, k as f64 * step, step)?;
+        if (k + 1) % parts == 0 {
+            run.sample(&stepper.state.tip().position, &stepper.state.nodes[0].force);
+        }
+    }
+    run.cpu = clock.elapsed().as_secs_f64();
+    Ok(run)
+}
+
+/// A step of the pose formulation, from `time` on.
+fn generalised_alpha(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Diverged> {
+    let scheme = Scheme::from_spectral_radius(scene.parameters().spectral_radius);
+    stepper.advance(&scene.boundary(time + step), scheme, step).map(drop)
+}
+
+/// A Runge-Kutta step of the pose formulation, from `time` on.
+fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Diverged> {
+    stepper.attempt(&|since| scene.boundary(time + since), step, STAGE_ACCURACY)?;
+    stepper.accept();
+    Ok(())
+}
+
+/// The unit, sampled at its communication points.
+fn simulate(experiment: &Experiment, parameters: &Parameters, resolution: Resolution) -> Result<Run, Box<dyn Error>> {
+    let mut run = Run::default();
+    let (mut clock, mut cells) = (None, 0);
+    // it has told its warnings when it ran for its own sake
+    experiment.run(parameters, |_, outputs, _| {
+        run.sample(&outputs.tip_position, &outputs.base_reaction_force);
+        cells = outputs.cells;
+        let clock = *clock.get_or_insert_with(ProcessTime::now);
+        run.cpu = clock.elapsed().as_secs_f64();
+        Ok(())
+    })?;
+    run.setting = match resolution {
+        Resolution::Grid { cells, stages, .. } => grid(cells, stages, parameters.step),
+        Resolution::Tolerance(_) => format!("{resolution}: cells={cells}"),
+    };
+    Ok(run)
+}
