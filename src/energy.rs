@@ -64,12 +64,7 @@ impl Energy {
         let tip = (boundary.tip_force + 0.5 * (force_old + force)).dot(&way)
             + (boundary.tip_moment + 0.5 * (moment_old + moment)).dot(&turned);
         let lost = 0.5 * new.dt * (losses(mesh, rod, old) + losses(mesh, rod, new));
-        Self {
-            dissipated: self.dissipated + lost,
-            work_base: self.work_base + base,
-            work_tip: self.work_tip + tip,
-            ..Self::of(mesh, rod, new, &boundary.gravity)
-        }
+        self.with(mesh, rod, new, &boundary.gravity, &Powers { base, tip, lost })
     }
 
     /// Energies of `state`, with the works and losses `work` added to those so far.

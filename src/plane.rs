@@ -29,7 +29,7 @@
 
 use crate::alpha::Motion;
 use crate::boundary::{Boundary, Drive, Held, Support};
-use crate::energy::Energy;
+use crate::energy::{Energy, Powers};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::pose::{self, State};
 use crate::rod::Rod;
@@ -309,17 +309,6 @@ pub struct Tip {
     pub rotation: Mat3,
     /// rad/s.
     pub angular_velocity: Vec3,
-}
-
-/// What the rod receives and loses at an instant, W.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Power {
-    /// From its base.
-    pub base: f64,
-    /// From the loads on its tip.
-    pub tip: f64,
-    /// In Kelvin-Voigt damping and drag.
-    pub lost: f64,
 }
 
 /// The fields of a cell at the instant that is looked at; those of its first node, the rest at the points.
@@ -1132,7 +1121,7 @@ impl Plane {
     }
 
     /// The powers.
-    pub fn power(&self) -> Power {
+    pub fn power(&self) -> Powers {
         let Section { stiffness, damping, mass, drag, .. } = self.section;
         let base = &self.fields[0].node;
         let force = self.frame.part(&self.looked_at.tip_force);
@@ -1145,7 +1134,7 @@ impl Plane {
             let loss = lane(|k| stiffness * damping * rate[k] * rate[k] + mass * drag * (u[k] * u[k] + v[k] * v[k]));
             cell.length * total(&self.rule.b, &loss)
         });
-        Power { base: -work(base, &base.force, base.moment), tip: work(&self.tip, &force, moment), lost: lost.sum() }
+        Powers { base: -work(base, &base.force, base.moment), tip: work(&self.tip, &force, moment), lost: lost.sum() }
     }
 
     /// The present as the state of a rod in space at a start, its jerks those of the last step. Looks at the present.

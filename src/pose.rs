@@ -193,33 +193,25 @@ impl Time {
 
     /// ω and ω_t of a section that has turned by `theta`.
     fn spin(&self, old: &Memory, theta: &Vec3) -> Motion {
-        match self {
-            Self::Stage { weight } => {
-                let rate = (theta - old.known.theta) * *weight;
-                let rate_t = (rate - old.known.rate) * *weight;
-                let (omega, drift) = so3::right_jacobian_rate(theta, &rate, &rate);
-                Motion::starting(omega, so3::right_jacobian(theta) * rate_t + drift, Vec3::zeros())
-            }
-            _ => self.motion(&old.spin, theta),
-        }
+        self.spin_with_derivatives(old, theta).0
     }
 
     /// ω and ω_t as [`Self::spin`], with their derivatives by `theta`; in a stage but for terms of the order of θ ω w in
     /// that of ω_t, small beside w².
+    #[inline]
     fn spin_with_derivatives(&self, old: &Memory, theta: &Vec3) -> (Motion, Mat3, Mat3) {
-        let spin = self.spin(old, theta);
         match self {
             Self::Stage { weight } => {
                 let rate = (theta - old.known.theta) * *weight;
                 let rate_t = (rate - old.known.rate) * *weight;
-                let J = so3::right_jacobian(theta);
-                let by_theta = J * *weight + so3::right_jacobian_derivative(theta, &rate);
-                let t_by_theta = J * (weight * weight) + so3::right_jacobian_derivative(theta, &rate_t);
-                (spin, by_theta, t_by_theta)
+                let map = so3::Tangent::new(theta);
+                let (J, by_log) = (map.jacobian(), map.by_log(&rate));
+                let spin = Motion::starting(J * rate, J * rate_t + by_log * rate, Vec3::zeros());
+                (spin, J * *weight + by_log, J * (weight * weight) + map.by_log(&rate_t))
             }
             _ => {
                 let (v, a) = self.weights();
-                (spin, Mat3::from_diagonal_element(v), Mat3::from_diagonal_element(a))
+                (self.motion(&old.spin, theta), Mat3::from_diagonal_element(v), Mat3::from_diagonal_element(a))
             }
         }
     }
@@ -594,14 +586,14 @@ fn acceleration_slope(spin: &Motion, drag: f64) -> Vec3 {
 
 /// The law of bending and twist at a point, with the strain rate expressed by the strain:
 /// Rᵀm = K_eff (κ − κ_eff), K_eff = K (1 + τ ∂κ_t/∂κ).
-pub(crate) struct Law {
+struct Law {
     stiffness: Vec3,
     kappa_free: Vec3,
 }
 
 impl Law {
     #[inline]
-    pub(crate) fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
+    fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
         let (weight, offset) = time.strain_rate(old);
         let factor = rod.damping.map(|tau| 1.0 + tau * weight);
         let free = kappa_rest - rod.damping.component_mul(&offset);
@@ -609,7 +601,7 @@ impl Law {
     }
 
     #[inline]
-    pub(crate) fn kappa(&self, section: &Section) -> Vec3 {
+    fn kappa(&self, section: &Section) -> Vec3 {
         self.kappa_free + section.rotation.tr_mul(&section.moment).component_div(&self.stiffness)
     }
 }

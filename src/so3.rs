@@ -327,58 +327,6 @@ pub fn rate_of_log(phi: &Vector3<f64>, kappa: &Vector3<f64>) -> (Vector3<f64>, M
     (value, derivative)
 }
 
-/// The derivatives of b and d by φ².
-#[inline]
-fn exp_derivatives(phi2: f64, (a, b, d): (f64, f64, f64)) -> (f64, f64) {
-    if phi2 < SERIES {
-        let b =
-            [-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0, -1.0 / 95_800_320.0, 1.0 / 14_529_715_200.0];
-        let d = [
-            -1.0 / 120.0,
-            1.0 / 2520.0,
-            -1.0 / 120_960.0,
-            1.0 / 9_979_200.0,
-            -1.0 / 1_245_404_160.0,
-            1.0 / 217_945_728_000.0,
-        ];
-        (series(b, phi2), series(d, phi2))
-    } else {
-        ((a - 2.0 * b) / (2.0 * phi2), (b - 3.0 * d) / (2.0 * phi2))
-    }
-}
-
-/// κ = J_r(Φ) x and its rate at fixed x while Φ changes by Φ_t.
-#[inline]
-pub fn right_jacobian_rate(phi: &Vector3<f64>, phi_t: &Vector3<f64>, x: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let phi2 = phi.norm_squared();
-    let coefficients = exp_coefficients(phi2);
-    let (_, b, d) = coefficients;
-    let (db, dd) = exp_derivatives(phi2, coefficients);
-    let stretch = 2.0 * phi.dot(phi_t);
-    let (once, once_t) = (phi.cross(x), phi_t.cross(x));
-    let (twice, twice_t) = (phi.cross(&once), phi_t.cross(&once) + phi.cross(&once_t));
-    let rate = twice * (dd * stretch) + twice_t * d - once * (db * stretch) - once_t * b;
-    (x - once * b + twice * d, rate)
-}
-
-/// The derivative of J_r(Φ) x by Φ at fixed x.
-#[inline]
-pub fn right_jacobian_derivative(phi: &Vector3<f64>, x: &Vector3<f64>) -> Matrix3<f64> {
-    let phi2 = phi.norm_squared();
-    let coefficients = exp_coefficients(phi2);
-    let (_, b, d) = coefficients;
-    let (db, dd) = exp_derivatives(phi2, coefficients);
-    let once = phi.cross(x);
-    let twice = phi.cross(&once);
-    // Φ̂x̂ = xΦᵀ − (Φ·x)1
-    let mut derivative = (twice * (2.0 * dd) - once * (2.0 * db) - x * d) * phi.transpose() + hat(&(x * b - once * d));
-    let dot = phi.dot(x) * d;
-    derivative[(0, 0)] += dot;
-    derivative[(1, 1)] += dot;
-    derivative[(2, 2)] += dot;
-    derivative
-}
-
 /// R with the rounding of many products removed: one Newton step towards RᵀR = 1.
 #[inline]
 pub fn orthonormalised(rotation: &Matrix3<f64>) -> Matrix3<f64> {

@@ -14,7 +14,7 @@ use crate::pose::{self, Known, Row, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta;
 use crate::so3;
-use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System};
+use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System, larger};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -144,11 +144,6 @@ impl Largest {
         }
         largest
     }
-}
-
-/// A maximum would drop what is not a number.
-fn larger(largest: f64, x: f64) -> f64 {
-    if x <= largest { largest } else { x }
 }
 
 /// A rod on a mesh with the storage to move it; after its construction nothing is allocated.

@@ -331,7 +331,7 @@ impl<const V: usize, const S: usize> Relation<V, S> {
 }
 
 /// A maximum would drop what is not a number.
-fn larger(largest: f64, x: f64) -> f64 {
+pub(crate) fn larger(largest: f64, x: f64) -> f64 {
     if x <= largest { largest } else { x }
 }
 

@@ -326,7 +326,7 @@ impl fmt::Display for Warning {
 const DISAGREEMENT: f64 = 0.02;
 
 /// Estimated error of the steps in the time that gravity or stiffness take to move the whole rod, over the tolerance.
-/// Measured on seven scenes of three to ten such times: the tip is then off by the tolerance or less.
+/// A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
 const ERROR_SHARE: f64 = 0.2;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;

@@ -213,7 +213,7 @@ fn energy_balances_to_the_order_in_time() {
                     let middle = plane.power();
                     plane.look(1.0, &at(h));
                     let end = plane.power();
-                    let mean = |of: fn(&cosserat_rod::plane::Power) -> f64| {
+                    let mean = |of: fn(&cosserat_rod::energy::Powers) -> f64| {
                         h / 6.0 * (of(&power) + 4.0 * of(&middle) + of(&end))
                     };
                     energy = Energy {
