@@ -69,12 +69,22 @@ impl Energy {
 
     /// Energies of `state`, with the works and losses `work` added to those so far.
     pub fn with(&self, mesh: &Mesh, rod: &Rod, state: &State, gravity: &Vector3<f64>, work: &Powers) -> Self {
+        self.worked(work).now(&Self::of(mesh, rod, state, gravity))
+    }
+
+    /// With `work` added to the works and losses.
+    pub fn worked(&self, work: &Powers) -> Self {
         Self {
             dissipated: self.dissipated + work.lost,
             work_base: self.work_base + work.base,
             work_tip: self.work_tip + work.tip,
-            ..Self::of(mesh, rod, state, gravity)
+            ..*self
         }
+    }
+
+    /// With the energies of `present`, but not its works.
+    pub fn now(&self, present: &Self) -> Self {
+        Self { kinetic: present.kinetic, elastic: present.elastic, gravity: present.gravity, ..*self }
     }
 
     /// kinetic + elastic + gravity.

@@ -10,19 +10,19 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> unit -> {path, modes, energy, stepper} -> pose -> sweep
-//!                       tests -> plane -> {rosenbrock, energy, pose}
-//!         examples, tests -> rate -> formulation -> {energy, stepper}
-//!                       pose, rate -> {alpha, boundary, rod, mesh, so3},  stepper -> runge_kutta
+//! host =C=> fmi2 -> unit -> {path, modes, integrator},  integrator -> {stepper, plane, energy}
+//!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
+//!      examples, tests -> rate -> formulation -> {energy, stepper}
+//!                       pose, rate -> {alpha, boundary, rod, mesh, so3}
 //! ```
 //!
 //! The rod is formulated twice, on the same rods, meshes, ends, time schemes and rotations: by [`pose`], which
 //! [`stepper`] solves and the unit moves, and by [`rate`], which is the paper's and solves itself. [`formulation`] is
 //! what both offer to those who set one beside the other; [`stepper`] says for both what a step reports and why it
-//! fails. The unit knows neither [`rate`] nor [`formulation`].
+//! fails. The integrator and the unit know neither [`rate`] nor [`formulation`].
 //!
 //! A rod that stays in a plane has in [`plane`] a third way: an ordinary differential equation in its angles alone, on the
-//! same rods, meshes and ends, which [`rosenbrock`] integrates.
+//! same rods, meshes and ends, which [`rosenbrock`] integrates. [`integrator`] chooses between that and the rod in space.
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
@@ -34,7 +34,7 @@
 //! 5. [`pose::State`] and [`rate::State`] are plain data; everything a later step depends on is in them. Rebuilding the
 //!    storage around them changes no bit of any result. Same inputs, same bits.
 //! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry
-//!    with smaller steps lives in [`mod@unit`], never in Newton.
+//!    with smaller steps lives in [`integrator`], never in Newton.
 //!
 //! # Notation
 //!
@@ -68,6 +68,7 @@ pub mod stepper;
 pub mod formulation;
 pub mod rate;
 pub mod modes;
+pub mod integrator;
 pub mod path;
 pub mod unit;
 

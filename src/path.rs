@@ -192,22 +192,38 @@ impl Path {
 }
 
 impl Segment {
-    /// The base `time` s after the start of the step.
-    pub fn at(&self, time: f64) -> Support {
-        let Support { position, rotation, velocity, angular_velocity, .. } = self.start;
+    /// The way since the start of the step, its rate and that of its rate.
+    fn coordinates(&self, time: f64) -> [Twist; 3] {
+        let Support { velocity, angular_velocity, .. } = self.start;
         let now = Twist { linear: velocity, angular: angular_velocity };
         let (start, slope, square) = (self.acceleration, self.next.jerk, time * time);
-        let moved = now.map(|v| v * time).plus(0.5 * square, start).plus(square * time / 6.0, slope);
-        let twist = now.plus(time, start).plus(0.5 * square, slope);
+        [
+            now.map(|v| v * time).plus(0.5 * square, start).plus(square * time / 6.0, slope),
+            now.plus(time, start).plus(0.5 * square, slope),
+            start.plus(time, slope),
+        ]
+    }
+
+    /// The base `time` s after the start of the step.
+    pub fn at(&self, time: f64) -> Support {
+        let Support { position, rotation, .. } = self.start;
+        let [moved, twist, acceleration] = self.coordinates(time);
         Support {
             position: position + moved.linear,
             rotation: so3::orthonormalised(&(so3::exp(&moved.angular) * rotation)),
             velocity: twist.linear,
             // the left Jacobian is the right one of −Φ
             angular_velocity: so3::right_jacobian(&-moved.angular) * twist.angular,
-            acceleration: start.plus(time, slope).linear,
+            acceleration: acceleration.linear,
             ..self.start
         }
+    }
+
+    /// How fast its acceleration and its angular velocity change then.
+    pub fn rates(&self, time: f64) -> (Vec3, Vec3) {
+        let [moved, twist, acceleration] = self.coordinates(time).map(|twist| twist.angular);
+        let map = so3::Tangent::new(&-moved);
+        (self.next.jerk.linear, map.jacobian() * acceleration - map.by_log(&twist) * twist)
     }
 
     /// The path at the end of the step.
@@ -248,6 +264,22 @@ mod tests {
                 (path.base.acceleration.x, a(t + h), path.base.position.x - x(t + h))
             })
             .collect()
+    }
+
+    #[test]
+    fn the_rates_are_derivatives() {
+        let twist = Twist { linear: Vec3::new(1.0, -2.0, 0.5), angular: Vec3::new(0.3, 1.0, -0.4) };
+        let mut path = Path::new(Given::Twist, sample(0.1, 0.7));
+        path.base.angular_velocity = Vec3::new(0.2, -0.5, 0.9);
+        let mut segment = path.segment(&sample(0.2, 1.1), 0.3);
+        (segment.acceleration, segment.next.jerk) = (twist, twist.map(|x| x.yzx()));
+        let (time, step) = (0.2, 1e-5);
+        let change =
+            |of: fn(&Support) -> Vec3| (of(&segment.at(time + step)) - of(&segment.at(time - step))) / (2.0 * step);
+        let (jerk, angular) = segment.rates(time);
+        // the second order of the differences, and their rounding
+        assert!((change(|base| base.acceleration) - jerk).norm() < 1e-8);
+        assert!((change(|base| base.angular_velocity) - angular).norm() < 1e-8);
     }
 
     #[test]

@@ -199,7 +199,7 @@ impl Frame {
 }
 
 /// The rod's numbers in the plane.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Section {
     /// EI about b.
     stiffness: f64,
@@ -339,6 +339,16 @@ struct Node {
     moment: f64,
 }
 
+/// A rod in a plane at an instant, as [`Plane::keep`] leaves it.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    points: Vec<Points>,
+    frame: Frame,
+    section: Section,
+    ends: Ends,
+    drive: Drive,
+}
+
 /// A rod in a plane with the storage to move it; after its construction nothing is allocated.
 #[derive(Clone, Debug)]
 pub struct Plane {
@@ -362,11 +372,6 @@ pub struct Plane {
     drive: Drive,
     next_ends: Ends,
     next_drive: Drive,
-    /// The last step and the one attempted, s; 0 at a start.
-    step: f64,
-    next_step: f64,
-    /// The change of the base's angular acceleration in the last step, rad/s².
-    turned: f64,
     fields: Vec<Field>,
     tip: Node,
     /// The instant looked at.
@@ -434,27 +439,20 @@ fn vectors(mesh: &Mesh, rod: &Rod, drive: &Drive) -> ([Scaled; 7], [Scaled; 4]) 
 }
 
 impl Plane {
-    /// The unstressed rod on a base, moving with it as one rigid body, in the plane with this normal; none if its
-    /// section or rest curvature would leave that.
-    pub fn new(mesh: &Mesh, rod: &Rod, normal: Vec3, base: &Support, method: &'static Rosenbrock) -> Option<Self> {
-        let section = section_in(mesh, rod, &base.rotation, &normal)?;
-        let frame = Frame::new(normal, &base.rotation);
-        let cells: Vec<Cell> = mesh
-            .cells
-            .iter()
-            .map(|cell| Cell { length: cell.length, rest: cell.kappa_rest.dot(&frame.axis) })
-            .collect();
-        let count = cells.len();
+    /// Room for the rod on a mesh, in no plane yet: [`Self::enter`] comes next.
+    pub fn new(mesh: &Mesh, rod: &Rod, method: &'static Rosenbrock) -> Self {
+        let base = Support::at_rest(Vec3::zeros(), Mat3::identity());
+        let drive = Drive { boundary: Boundary::hanging_from(base, Vec3::zeros()), rates: Default::default() };
+        let count = mesh.cells.len();
         let points = vec![Points::default(); count];
-        let drive = Drive { boundary: Boundary::hanging_from(*base, Vec3::zeros()), rates: Default::default() };
-        let mut plane = Self {
+        Self {
             rule: Rule::new(&mesh.rule),
             mesh: mesh.clone(),
             rod: rod.clone(),
             method,
-            frame,
-            section,
-            cells,
+            frame: Frame::new(Vec3::y(), &base.rotation),
+            section: Section::default(),
+            cells: mesh.cells.iter().map(|cell| Cell { length: cell.length, rest: 0.0 }).collect(),
             now: points.clone(),
             before: points.clone(),
             next: points.clone(),
@@ -467,43 +465,61 @@ impl Plane {
             looked_at: drive.boundary,
             drive,
             next_drive: drive,
-            step: 0.0,
-            next_step: 0.0,
-            turned: 0.0,
             fields: vec![Field::default(); count],
             tip: Node::default(),
-        };
-        let (mut angle, spin) = (0.0, frame.normal.dot(&base.angular_velocity));
-        for (points, cell) in plane.now.iter_mut().zip(&plane.cells) {
-            for k in 0..mesh.rule.stages {
-                points[0][k] = angle + cell.rest * (cell.length * mesh.rule.c[k]);
-                points[1][k] = spin;
-            }
-            angle += cell.rest * cell.length;
         }
-        plane.stand(&drive);
-        Some(plane)
     }
 
-    /// The unstressed rod in the plane that all that is given lies in; none if there is no such plane.
-    pub fn of(mesh: &Mesh, rod: &Rod, drive: &Drive, method: &'static Rosenbrock) -> Option<Self> {
-        let base = &drive.boundary.base;
+    /// Takes over a rod in space, at the instant of its last step: in the plane that it lies and moves in, and in which
+    /// `drive` leaves it. Whether there is one; without one this is a rod in no plane. The accelerations are those of the
+    /// rod in space: [`Self::start`] finds those of the equations.
+    pub fn enter(&mut self, state: &State, drive: &Drive) -> bool {
+        let base = &drive.boundary.base.rotation;
+        let normal = self.normal(state, drive);
+        let Some(section) = section_in(&self.mesh, &self.rod, base, &normal) else { return false };
+        self.stand_in(Frame::new(normal, base), section);
+        self.ends = Ends::default();
+        self.holds(drive) && self.take_state(state)
+    }
+
+    fn stand_in(&mut self, frame: Frame, section: Section) {
+        (self.frame, self.section) = (frame, section);
+        for (cell, own) in self.cells.iter_mut().zip(&self.mesh.cells) {
+            cell.rest = own.kappa_rest.dot(&frame.axis);
+        }
+    }
+
+    /// The normal of the only plane that can hold all this; where any can, one with a principal axis of the sections.
+    fn normal(&self, state: &State, drive: &Drive) -> Vec3 {
+        let Self { mesh, rod, .. } = self;
+        let base = &drive.boundary.base.rotation;
         let (in_plane, normal) = vectors(mesh, rod, drive);
-        let bent = |cell: &crate::mesh::Cell| (base.rotation * cell.kappa_rest, 1.0 / mesh.length());
-        let largest = |candidates: &mut dyn Iterator<Item = (Vec3, f64)>| {
-            let bound = |(vector, size): (Vec3, f64)| (vector.norm() / size, vector);
+        let frequency = normal[0].1;
+        let largest = |candidates: &mut dyn Iterator<Item = Scaled>| {
+            let bound = |(vector, size): Scaled| (vector.norm() / size, vector);
             candidates
                 .map(bound)
                 .filter(|(size, _)| *size > ROUNDING)
                 .max_by(|a, b| a.0.total_cmp(&b.0))
                 .map(|(_, vector)| vector.normalize())
         };
-        let d_3 = base.rotation.column(2).into_owned();
-        let across = |(vector, size): (Vec3, f64)| (d_3.cross(&vector) / vector.norm().max(size * ROUNDING), 1.0);
-        let normal = largest(&mut normal.into_iter().chain(mesh.cells.iter().map(bent)))
+        let bent = mesh.cells.iter().map(|cell| (base * cell.kappa_rest, 1.0 / mesh.length()));
+        let turned = state.nodes.windows(2).map(|pair| (pair[0].rotation * pair[1].turn, STRAY / ROUNDING));
+        let sections = (0..state.memory.len()).map(|i| state.remembering(i).rotation);
+        let moved = sections
+            .zip(&state.memory)
+            .map(|(rotation, memory)| (rotation * memory.spin.velocity.value, frequency * (STRAY / ROUNDING)));
+        let d_3 = base.column(2).into_owned();
+        let across = |(vector, size): Scaled| (d_3.cross(&vector) / vector.norm().max(size * ROUNDING), 1.0);
+        largest(&mut normal.into_iter().chain(bent).chain(turned).chain(moved))
             .or_else(|| largest(&mut in_plane.into_iter().map(across)))
-            .unwrap_or_else(|| base.rotation.column(1).into_owned());
-        Self::new(mesh, rod, normal, base, method).filter(|plane| plane.holds(drive))
+            .unwrap_or_else(|| base.column(1).into_owned())
+    }
+
+    /// The unstressed rod in the plane that all that is given lies in; none if there is no such plane.
+    pub fn of(mesh: &Mesh, rod: &Rod, drive: &Drive, method: &'static Rosenbrock) -> Option<Self> {
+        let mut plane = Self::new(mesh, rod, method);
+        plane.enter(&State::at_rest_shape(mesh, &drive.boundary.base), drive).then_some(plane)
     }
 
     /// Whether what acts on the rod leaves it in its plane, clamped at the base and free at the tip.
@@ -562,7 +578,6 @@ impl Plane {
     /// The present becomes a start.
     fn stand(&mut self, drive: &Drive) {
         (self.ends, self.drive) = (self.ends_of(drive, &self.ends), *drive);
-        (self.step, self.turned) = (0.0, 0.0);
         self.before.copy_from_slice(&self.now);
         self.increments.fill(Points::default());
         self.look(1.0, drive);
@@ -638,7 +653,7 @@ impl Plane {
                 *increment = [x, v, lane(|k| w * v[k] - stage.q[k])];
             }
         }
-        (self.next_ends, self.next_drive, self.next_step) = (ends, at_stage, h);
+        (self.next_ends, self.next_drive) = (ends, at_stage);
         Ok(self.finish(h))
     }
 
@@ -676,8 +691,7 @@ impl Plane {
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.before, &mut self.now);
         std::mem::swap(&mut self.now, &mut self.next);
-        self.turned = self.next_ends.turning - self.ends.turning;
-        (self.ends, self.drive, self.step) = (self.next_ends, self.next_drive, self.next_step);
+        (self.ends, self.drive) = (self.next_ends, self.next_drive);
     }
 
     fn rates_of(&self, now: &Drive, drive: &impl Fn(f64) -> Drive, h: f64) -> EndRates {
@@ -1089,11 +1103,21 @@ impl Plane {
             left -= self.cells[j].length;
             j += 1;
         }
-        let (cell, field) = (&self.cells[j], &self.fields[j]);
-        let weights = self.mesh.rule.weights(left / cell.length);
+        self.position_within(j, left / self.cells[j].length)
+    }
+
+    /// The centreline at the fraction `theta` of a cell, m, world frame.
+    pub fn position_within(&self, cell: usize, theta: f64) -> Vec3 {
+        let (Cell { length, .. }, field) = (&self.cells[cell], &self.fields[cell]);
+        let weights = self.mesh.rule.weights(theta);
         let [x, y] = field.node.position;
-        let way = [x + cell.length * total(&weights, &field.cos), y + cell.length * total(&weights, &field.sin)];
+        let way = [x + length * total(&weights, &field.cos), y + length * total(&weights, &field.sin)];
         self.looked_at.base.position + self.frame.vector(way)
+    }
+
+    /// Whether energy is lost in it, in damping or drag.
+    pub fn is_lossy(&self) -> bool {
+        self.section.damping > 0.0 || self.section.drag > 0.0
     }
 
     /// The energies; no works.
@@ -1137,15 +1161,19 @@ impl Plane {
         Powers { base: -work(base, &base.force, base.moment), tip: work(&self.tip, &force, moment), lost: lost.sum() }
     }
 
-    /// The present as the state of a rod in space at a start, its jerks those of the last step. Looks at the present.
-    pub fn to_state(&mut self) -> State {
+    /// What acts on the rod at present.
+    pub fn drive(&self) -> &Drive {
+        &self.drive
+    }
+
+    /// Makes `state` the present, as a start of a rod in space on the same mesh. Looks at the present.
+    pub fn write(&mut self, state: &mut State) {
         let drive = self.drive;
         self.look(1.0, &drive);
-        let Self { frame, mesh, section, rule, .. } = self;
-        let Support { position: base, .. } = drive.boundary.base;
+        let Self { frame, mesh, section, .. } = self;
+        let base = drive.boundary.base.position;
         let gravity = frame.part(&drive.boundary.gravity);
         let axis = frame.axis;
-        let per_step = if self.step > 0.0 { 1.0 / self.step } else { 0.0 };
         let of = |at: f64, before: f64, position: [f64; 2], force: [f64; 2], moment: f64, acceleration: [f64; 2]| {
             pose::Section {
                 position: base + frame.vector(position),
@@ -1156,63 +1184,60 @@ impl Plane {
                 acceleration: frame.vector(from_fn(|i| acceleration[i] + gravity[i])),
             }
         };
-        // the stretch from a node to the next, its angle before and the jerk of its place carried on
-        let mut state = State::at_rest_shape(mesh, &drive.boundary.base);
-        state.boundary = drive.boundary;
-        let jerk = frame.part(&drive.rates.jerk);
-        let (mut before, mut jerk, mut turned) = (self.ends.angle, jerk, self.turned * per_step);
-        for (j, field) in self.fields.iter().enumerate() {
-            let (h, node, points) = (self.cells[j].length, &field.node, &self.now[j]);
+        let free = |velocity: [f64; 2], acceleration: [f64; 2]| {
+            frame.vector(from_fn(|i| acceleration[i] + gravity[i] - section.drag * velocity[i]))
+        };
+        let zero = Vec3::zeros();
+        (state.boundary, state.dt) = (drive.boundary, 0.0);
+        let mut before = self.ends.angle;
+        for (j, (field, points)) in self.fields.iter().zip(&self.now).enumerate() {
+            let node = &field.node;
             let angle = node.angle[0];
             state.nodes[j] = of(angle, before, node.position, node.force, node.moment, node.acceleration);
             before = angle;
-            let [_, omega, beta] = points;
-            let beta_t = lane(|k| per_step * (beta[k] - self.before[j][2][k]));
-            let along = lane(|k| -3.0 * omega[k] * beta[k]);
-            let across = lane(|k| beta_t[k] - omega[k].powi(3));
-            let slope = [
-                lane(|k| along[k] * field.cos[k] - across[k] * field.sin[k]),
-                lane(|k| along[k] * field.sin[k] + across[k] * field.cos[k]),
-            ];
             for k in 0..mesh.rule.stages {
                 let i = j * mesh.rule.stages + k;
                 let at = |lanes: &[Lane; 2]| [lanes[0][k], lanes[1][k]];
-                let acceleration = at(&field.acceleration);
+                let (velocity, acceleration) = (at(&field.velocity), at(&field.acceleration));
                 state.points[i] =
                     of(points[0][k], angle, at(&field.position), at(&field.force), field.moment[k], acceleration);
-                let sum = |weights: &dyn Fn(usize) -> f64| (0..mesh.rule.stages).map(weights).sum::<f64>();
-                let velocity = at(&field.velocity);
-                let free = |i: usize| acceleration[i] + gravity[i] - section.drag * velocity[i];
                 let memory = &mut state.memory[i];
-                memory.spin = Motion::starting(axis * omega[k], axis * beta[k], axis * beta_t[k]);
-                memory.travel = Motion::starting(
-                    frame.vector(velocity),
-                    frame.vector(from_fn(free)),
-                    frame.vector(from_fn(|i| jerk[i] + h * sum(&|l| mesh.rule.a[k][l] * slope[i][l]))),
-                );
+                memory.spin = Motion::starting(axis * points[1][k], axis * points[2][k], zero);
+                memory.travel = Motion::starting(frame.vector(velocity), free(velocity, acceleration), zero);
                 memory.kappa = axis * field.strain[0][k];
-                let strain_ttt = sum(&|l| mesh.rule.a_inverse[k][l] * (beta_t[l] - turned)) / h;
-                memory.strain =
-                    Motion::starting(axis * field.strain[1][k], axis * field.strain[2][k], axis * strain_ttt);
+                memory.strain = Motion::starting(axis * field.strain[1][k], axis * field.strain[2][k], zero);
             }
-            for i in 0..2 {
-                jerk[i] += h * total(&rule.b, &slope[i]);
-            }
-            turned += total(&rule.end, &beta_t.map(|beta_t| beta_t - turned));
         }
         let Node { angle: [angle, rate, turning], position, velocity, acceleration, force, moment } = self.tip;
         let (node, last) = (self.cells.len(), state.memory.len() - 1);
         state.nodes[node] = of(angle, before, position, force, moment, acceleration);
-        let free = |i: usize| acceleration[i] + gravity[i] - section.drag * velocity[i];
         let tip = &mut state.memory[last];
-        tip.spin = Motion::starting(axis * rate, axis * turning, axis * turned);
-        tip.travel = Motion::starting(frame.vector(velocity), frame.vector(from_fn(free)), frame.vector(jerk));
-        state
+        tip.spin = Motion::starting(axis * rate, axis * turning, zero);
+        tip.travel = Motion::starting(frame.vector(velocity), free(velocity, acceleration), zero);
     }
 
-    /// Takes over a rod in space, at the instant of its last step; whether it lies and moves in this plane, and nothing
-    /// has changed if not. Its accelerations are those of its time scheme: [`Self::start`] finds those of the equations.
-    pub fn take_state(&mut self, state: &State) -> bool {
+    /// The present, to be kept in the same place again and again.
+    pub fn kept(&self) -> Kept {
+        let Self { now, frame, section, ends, drive, .. } = self;
+        Kept { points: now.clone(), frame: *frame, section: *section, ends: *ends, drive: *drive }
+    }
+
+    /// Copies the present into `kept`, from where [`Self::restore`] takes it.
+    pub fn keep(&self, kept: &mut Kept) {
+        kept.points.copy_from_slice(&self.now);
+        (kept.frame, kept.section, kept.ends, kept.drive) = (self.frame, self.section, self.ends, self.drive);
+    }
+
+    /// Makes what was kept the present again.
+    pub fn restore(&mut self, kept: &Kept) {
+        self.stand_in(kept.frame, kept.section);
+        self.now.copy_from_slice(&kept.points);
+        self.ends = kept.ends;
+        self.stand(&kept.drive);
+    }
+
+    /// Takes the angles of a rod in space and their rates; whether it lies and moves in this plane.
+    fn take_state(&mut self, state: &State) -> bool {
         let Self { frame, mesh, .. } = self;
         let drive = Drive { boundary: state.boundary, rates: Default::default() };
         let axis = frame.axis;
@@ -1339,7 +1364,8 @@ mod tests {
                 Vec3::y() * (0.5 + s)
             });
         let base = Support::at_rest(Vec3::zeros(), Mat3::identity());
-        let mut plane = Plane::new(&mesh, rod, Vec3::y(), &base, &RODAS4).unwrap();
+        let drive = Drive { boundary: Boundary::hanging_from(base, Vec3::zeros()), rates: Default::default() };
+        let mut plane = Plane::of(&mesh, rod, &drive, &RODAS4).unwrap();
         let points = |random: &mut Random| -> Vec<Points> {
             (0..cells)
                 .map(|_| from_fn(|q| lane(|k| if k < K { random.next() * [1.0, 4.0, 30.0][q] } else { 0.0 })))

@@ -1,4 +1,4 @@
-//! A Runge-Kutta method of high order and the choice of its steps. It knows numbers and no rod.
+//! A Runge-Kutta method of high order. It knows numbers and no rod.
 //!
 //! ```text
 //! Yᵢ = y₀ + h Σ_{j≤i} aᵢⱼ Y'ⱼ          a₁₁ = 0, aᵢᵢ = γ          y₁ = Y_s
@@ -70,18 +70,6 @@ pub fn error_weight(j: usize) -> f64 {
     weight(j) - EMBEDDED[j]
 }
 
-/// Part of the step that the estimate would allow which is taken, so that few are refused.
-const SAFETY: f64 = 0.9;
-/// Bounds of the change from one step to the next.
-const CHANGE: (f64, f64) = (0.2, 4.0);
-
-/// How much longer the next step may be than one with the error `part`, as a part of what is allowed; steps are allowed
-/// errors in proportion to their length.
-pub fn stretch(part: f64) -> f64 {
-    // the estimate goes with h⁴, what is allowed with h
-    (SAFETY * part.max(1e-12).powf(-1.0 / 3.0)).clamp(CHANGE.0, CHANGE.1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,12 +137,5 @@ mod tests {
             assert!(factor(y) <= 1.0 + 1e-12, "{y}: {}", factor(y));
         }
         assert!(factor(1e8) < 1e-6);
-    }
-
-    #[test]
-    fn steps_follow_their_error() {
-        assert_eq!(stretch(0.0), CHANGE.1);
-        assert_eq!(stretch(1e30), CHANGE.0);
-        assert!((stretch(1.0) - SAFETY).abs() < 1e-15);
     }
 }

@@ -255,6 +255,25 @@ impl Stepper {
         self.solve(boundary, &Time::Static)
     }
 
+    /// The static equilibrium under `boundary`, `dt` s after the present one: as [`Self::relax`], with the differences of
+    /// the two as velocities.
+    ///
+    /// # Errors
+    /// [`Diverged`]; the state is as before.
+    pub fn drift(&mut self, boundary: &Boundary, dt: f64) -> Result<Report, Diverged> {
+        let report = self.relax(boundary)?;
+        let Self { state, trial: before, .. } = self;
+        let moving = |change: Vector3<f64>| Motion::starting(change / dt, Vector3::zeros(), Vector3::zeros());
+        for i in 0..state.memory.len() {
+            let (from, to) = (before.remembering(i), state.remembering(i));
+            let (turn, way) = (so3::log(&from.rotation.tr_mul(&to.rotation)), to.position - from.position);
+            let memory = &mut state.memory[i];
+            (memory.spin, memory.travel) = (moving(turn), moving(way));
+            memory.strain = moving(memory.kappa - before.memory[i].kappa);
+        }
+        Ok(report)
+    }
+
     /// Computes a step of `h` s of order 4 ([`runge_kutta`]) under `drive`, what acts as a function of the time since its
     /// beginning; [`Self::accept`] takes it. The present accelerations must be consistent with what acts
     /// ([`Self::accelerate`]). For a rod that neither shears nor stretches, clamped at its base and free at its tip.

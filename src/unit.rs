@@ -1,21 +1,19 @@
 //! The model without FMI: parameters and inputs in, one rod advanced by communication steps, outputs out.
 //!
-//! A communication step is cut into internal steps that land exactly on its end. Left to itself the unit takes steps of
-//! order 4, as long as their estimated error allows; where they would become too many, and where the host gives their
-//! length, generalized-α steps. One of those that diverges is halved, and its halves again if need be; if that does not
-//! help either, the unit is as it was before the communication step.
+//! Between two communication points the base follows a path through what the host samples ([`crate::path`]) and the
+//! rod is moved to the tolerance ([`crate::integrator`]). What the host may set is checked here, and errors name it.
 
 use crate::alpha::Scheme;
-use crate::boundary::Boundary;
+use crate::boundary::{Boundary, Drive, Rates};
 use crate::energy::Energy;
+use crate::integrator::{Effort, Ends, Failed, Integrator, Way};
 use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
-use crate::pose::{Row, State};
+use crate::pose::State;
 use crate::rod::Rod;
-use crate::runge_kutta;
 use crate::so3;
-use crate::stepper::{Attempt, Diverged, Stepper};
+use crate::stepper::{Diverged, Stepper};
 use nalgebra::{Vector3, Vector4};
 use std::f64::consts::PI;
 use std::fmt;
@@ -74,6 +72,10 @@ pub struct Parameters {
     pub spectral_radius: f64,
     /// Start from the static equilibrium instead of the rest shape.
     pub start_in_equilibrium: bool,
+    /// The rod may be one in a plane, as long as nothing leaves that.
+    pub planar: bool,
+    /// No inertia and no damping: from one equilibrium to the next.
+    pub quasi_static: bool,
 }
 
 impl Default for Parameters {
@@ -104,6 +106,8 @@ impl Default for Parameters {
             tolerance: 0.0,
             spectral_radius: 0.5,
             start_in_equilibrium: false,
+            planar: true,
+            quasi_static: false,
         }
     }
 }
@@ -158,21 +162,10 @@ pub struct Outputs {
     pub stations: [Vector3<f64>; STATIONS],
     /// Energies and works.
     pub energy: Energy,
-    /// Internal steps since the start.
-    pub steps: i32,
-    /// Newton iterations since the start.
-    pub iterations: i32,
-    /// Internal steps that had to be tried again since the start.
-    pub retries: i32,
     /// Cells in use.
     pub cells: i32,
-    /// Order in time of the last internal step; 0 before the first.
-    pub order: i32,
-    /// Length of the last internal step, s.
-    pub step: f64,
-    /// Sum of the steps' estimated errors of the centreline since the start, over the length; none are estimated where
-    /// the host gives the steps.
-    pub error_estimate: f64,
+    /// What it took since the start.
+    pub solver: Effort,
 }
 
 /// What a variable may be set to, beyond being finite.
@@ -325,84 +318,19 @@ impl fmt::Display for Warning {
 /// disagree; half a communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
-/// Estimated error of the steps in the time that gravity or stiffness take to move the whole rod, over the tolerance.
-/// A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
-const ERROR_SHARE: f64 = 0.2;
-/// The first step over that time: short enough to be accepted, and the next ones follow their error.
-const FIRST_STEP: f64 = 1.0 / 80.0;
-
-/// The shortest step of order 4 over the step of generalized-α for the same tolerance.
-const SHORTEST_STEP: f64 = 0.1;
-
-/// Most internal steps chosen for a communication step.
-const MAX_AUTOMATIC_STEPS: f64 = 1000.0;
-
 /// Internal steps in a communication step beyond which the host has asked for something else than it wants.
 const MAX_INTERNAL_STEPS: f64 = 1e7;
-
-/// Length of the next step over one that Newton has lost.
-const LOST: f64 = 0.3;
-
-/// Halvings of a generalized-α step before it is given up.
-const MAX_HALVINGS: u32 = 12;
 
 /// One rod, started and ready to step.
 #[derive(Clone, Debug)]
 pub struct Unit {
-    stepper: Stepper,
-    scheme: Scheme,
-    /// Longest internal step of generalized-α, s.
-    step: f64,
-    /// Of the steps of order 4, where they are taken.
-    pace: Option<Pace>,
+    integrator: Integrator,
+    /// Longest internal step, where the host gives it, s.
+    step: Option<f64>,
     gravity: Vector3<f64>,
     path: Path,
-    energy: Energy,
-    backup: State,
-    stations: [Station; STATIONS],
     warned: bool,
-    counts: Counts,
     outputs: Outputs,
-}
-
-/// Work done since the start.
-#[derive(Clone, Copy, Debug, Default)]
-struct Counts {
-    steps: i32,
-    iterations: i32,
-    retries: i32,
-    /// Of the last step.
-    order: i32,
-    step: f64,
-    /// Estimated so far.
-    error: f64,
-}
-
-/// How long steps of order 4 may be.
-#[derive(Clone, Copy, Debug)]
-struct Pace {
-    /// Error they may have in a second, over the length.
-    allowed: f64,
-    /// The next one, if its error allows, s.
-    next: f64,
-    /// The shortest, s: what is faster than that is damped, not followed.
-    shortest: f64,
-}
-
-/// How a step of generalized-α is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
-    /// As suits it.
-    Fitting,
-    /// By implicit Euler and the accelerations of the positions: what cannot be followed rests, whatever the step.
-    Damped,
-}
-
-/// Where a station lies in the mesh.
-#[derive(Clone, Copy, Debug, Default)]
-struct Station {
-    cell: usize,
-    theta: f64,
 }
 
 impl Parameters {
@@ -524,14 +452,12 @@ impl Parameters {
         if self.step > 0.0 { self.step } else { self.time(rod) / 80.0 * (tolerance / 1e-3).sqrt() }
     }
 
-    /// How the steps of order 4 begin, where they are taken.
-    fn pace(&self, rod: &Rod, tolerance: f64) -> Option<Pace> {
-        let time = self.time(rod);
-        (self.step == 0.0 && !self.extensible).then_some(Pace {
-            allowed: ERROR_SHARE * tolerance / time,
-            next: time * FIRST_STEP,
-            shortest: SHORTEST_STEP * self.longest_step(rod, tolerance),
-        })
+    fn way(&self, rod: &Rod, tolerance: f64) -> Way {
+        match () {
+            () if self.quasi_static => Way::Static,
+            () if self.step > 0.0 => Way::Equal,
+            () => Way::Accurate { tolerance, time: self.time(rod), planar: self.planar },
+        }
     }
 }
 
@@ -602,8 +528,7 @@ impl Unit {
         let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
         let rod = parameters.rod();
         let mesh = parameters.mesh(&rod, inputs, tolerance)?;
-        let step = parameters.longest_step(&rod, tolerance);
-        let pace = parameters.pace(&rod, tolerance);
+        let (way, step) = (parameters.way(&rod, tolerance), parameters.longest_step(&rod, tolerance));
         let path = Path::new(
             match parameters.base_motion {
                 0 => Given::PoseAndTwist,
@@ -620,29 +545,22 @@ impl Unit {
 
         let state = State::at_rest_shape(&mesh, &boundary.base);
         let mut stepper = Stepper::new(mesh, rod, state);
-        if parameters.start_in_equilibrium {
+        if parameters.start_in_equilibrium || parameters.quasi_static {
             stepper.equilibrium(&boundary).map_err(Error::NoEquilibrium)?;
             let lowest = modes::modes(&mut stepper, &boundary, 1).map_err(Error::NoEquilibrium)?;
             if let Some(mode) = lowest.iter().find(|mode| mode.omega_squared <= 0.0) {
                 return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
             }
         }
-        stepper.start(&boundary).map_err(Error::NoStart)?;
-
-        let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
+        let scheme = Scheme::from_spectral_radius(parameters.spectral_radius);
+        let integrator = Integrator::new(stepper, way, scheme, step, &boundary).map_err(Error::NoStart)?;
         let mut unit = Self {
-            scheme: Scheme::from_spectral_radius(parameters.spectral_radius),
-            step,
-            pace,
+            integrator,
+            step: (way == Way::Equal).then_some(step),
             gravity: parameters.gravity,
             path,
-            energy,
-            backup: stepper.state.clone(),
-            stations: stations(&stepper.mesh),
             warned: false,
-            counts: Counts::default(),
             outputs: Outputs::default(),
-            stepper,
         };
         unit.read_out();
         Ok(unit)
@@ -661,155 +579,34 @@ impl Unit {
                 allowed: Allowed::Positive,
             });
         }
-        if self.pace.is_none() && step_size / self.step > MAX_INTERNAL_STEPS {
+        if let Some(step) = self.step.filter(|step| step_size / step > MAX_INTERNAL_STEPS) {
             let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
-            return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
+            return Err(Error::NotAllowed { name: "step", value: step, allowed });
         }
         let segment = self.path.segment(&inputs.sample(), step_size);
-        self.backup.copy_from(&self.stepper.state);
-        let (energy, counts, pace) = (self.energy, self.counts, self.pace);
-        let done = match self.pace {
-            Some(pace) => self.follow(&segment, inputs, step_size, pace),
-            None => self.march(&segment, inputs, step_size),
+        let gravity = self.gravity;
+        let drive = |time: f64| {
+            let (jerk, angular_acceleration) = segment.rates(time);
+            Drive {
+                boundary: Boundary {
+                    tip_force: inputs.tip_force,
+                    tip_moment: inputs.tip_moment,
+                    ..Boundary::hanging_from(segment.at(time), gravity)
+                },
+                rates: Rates { jerk, angular_acceleration, ..Rates::default() },
+            }
         };
-        if let Err(error) = done {
-            self.stepper.state.copy_from(&self.backup);
-            (self.energy, self.counts, self.pace) = (energy, counts, pace);
-            return Err(error);
-        }
+        let done = self.integrator.advance(&drive, step_size);
+        done.map_err(|Failed { time, step, cause }| Error::Diverged { time, step, cause })?;
         let warning = self.disagreement(&segment, step_size);
         self.path = segment.into_path();
         self.read_out();
         Ok(warning)
     }
 
-    /// A communication step in equal steps of generalized-α.
-    fn march(&mut self, segment: &Segment, inputs: &Inputs, step_size: f64) -> Result<(), Error> {
-        // a host's round-off does not cost a step
-        let steps = (step_size / self.step * (1.0 - 1e-9)).ceil().max(1.0);
-        let dt = step_size / steps;
-        let mut i = 0.0;
-        while i < steps {
-            self.internal_step(segment, inputs, Way::Fitting, i * dt, dt, 0)?;
-            i += 1.0;
-        }
-        Ok(())
-    }
-
-    /// A communication step in steps of order 4, as long as their error allows; steps of generalized-α take over where
-    /// they would be too many.
-    fn follow(&mut self, segment: &Segment, inputs: &Inputs, step_size: f64, pace: Pace) -> Result<(), Error> {
-        let Pace { allowed, mut next, shortest } = pace;
-        let gravity = self.gravity;
-        let drive = |time: f64| Boundary {
-            tip_force: inputs.tip_force,
-            tip_moment: inputs.tip_moment,
-            ..Boundary::hanging_from(segment.at(time), gravity)
-        };
-        let shortest = shortest.max(step_size / MAX_AUTOMATIC_STEPS);
-        let mut time = 0.0;
-        while time < step_size {
-            let rest = step_size - time;
-            let parts = (rest / next.max(shortest)).ceil().max(1.0);
-            let dt = rest / parts;
-            let attempt = self.attempt(&drive, time, dt, allowed * dt);
-            let tried = match attempt {
-                Ok(Attempt { iterations, error, work }) => {
-                    self.counts.iterations = self.counts.iterations.saturating_add(iterations as i32);
-                    next = dt * runge_kutta::stretch(error / (allowed * dt));
-                    // what the shortest step cannot follow it damps, and the outputs tell the error
-                    if error <= allowed * dt || dt <= shortest {
-                        self.stepper.accept();
-                        let Stepper { mesh, rod, state, .. } = &self.stepper;
-                        self.energy = self.energy.with(mesh, rod, state, &gravity, &work);
-                        self.counts.steps = self.counts.steps.saturating_add(1);
-                        (self.counts.order, self.counts.step) = (runge_kutta::ORDER, dt);
-                        self.counts.error += error;
-                        true
-                    } else {
-                        false
-                    }
-                }
-                Err(diverged) => {
-                    self.counts.iterations = self.counts.iterations.saturating_add(diverged.iterations as i32);
-                    next = dt * LOST;
-                    false
-                }
-            };
-            if !tried {
-                self.counts.retries = self.counts.retries.saturating_add(1);
-                if dt > shortest {
-                    continue;
-                }
-                self.internal_step(segment, inputs, Way::Damped, time, dt, 0)?;
-                next = shortest;
-            }
-            time = if parts == 1.0 { step_size } else { time + dt };
-        }
-        self.pace = Some(Pace { next, ..pace });
-        Ok(())
-    }
-
-    /// A step of order 4 from `time` on, with the accelerations made consistent first where they are not.
-    fn attempt(
-        &mut self,
-        drive: &impl Fn(f64) -> Boundary,
-        time: f64,
-        dt: f64,
-        accuracy: f64,
-    ) -> Result<Attempt, Diverged> {
-        let begin = drive(time);
-        let before = &self.stepper.state.boundary;
-        let jumped = (before.tip_force, before.tip_moment, before.gravity, before.base.acceleration)
-            != (begin.tip_force, begin.tip_moment, begin.gravity, begin.base.acceleration);
-        if jumped || self.stepper.state.dt > 0.0 {
-            self.stepper.accelerate(&begin)?;
-        }
-        self.stepper.attempt(&|since: f64| drive(time + since), dt, accuracy)
-    }
-
-    /// One generalized-α step from `time`, or its two halves.
-    fn internal_step(
-        &mut self,
-        segment: &Segment,
-        inputs: &Inputs,
-        way: Way,
-        time: f64,
-        dt: f64,
-        halvings: u32,
-    ) -> Result<(), Error> {
-        let boundary = Boundary {
-            tip_force: inputs.tip_force,
-            tip_moment: inputs.tip_moment,
-            ..Boundary::hanging_from(segment.at(time + dt), self.gravity)
-        };
-        let report = match way {
-            Way::Fitting => self.stepper.advance(&boundary, self.scheme, dt),
-            Way::Damped => self.stepper.step(&boundary, Scheme::BACKWARD_EULER, dt, Row::Positions),
-        };
-        match report {
-            Ok(report) => {
-                self.counts.steps = self.counts.steps.saturating_add(1);
-                self.counts.iterations = self.counts.iterations.saturating_add(report.iterations as i32);
-                let second = self.stepper.state.scheme.is_second_order();
-                (self.counts.order, self.counts.step) = (if second { 2 } else { 1 }, dt);
-                let Stepper { mesh, rod, state, .. } = &self.stepper;
-                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
-                Ok(())
-            }
-            Err(cause) if halvings == MAX_HALVINGS => Err(Error::Diverged { time, step: dt, cause }),
-            Err(cause) => {
-                self.counts.retries = self.counts.retries.saturating_add(1);
-                self.counts.iterations = self.counts.iterations.saturating_add(cause.iterations as i32);
-                self.internal_step(segment, inputs, way, time, 0.5 * dt, halvings + 1)?;
-                self.internal_step(segment, inputs, way, time + 0.5 * dt, 0.5 * dt, halvings + 1)
-            }
-        }
-    }
-
     fn disagreement(&mut self, segment: &Segment, step_size: f64) -> Option<Warning> {
         let base = self.path.base();
-        let length = self.stepper.mesh.length();
+        let length = self.integrator.length();
         let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * base.velocity.norm();
         let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * base.angular_velocity.norm();
         if self.warned || !(far || turned) {
@@ -835,9 +632,9 @@ impl Unit {
         &self.outputs
     }
 
-    /// The rod itself.
-    pub fn stepper(&self) -> &Stepper {
-        &self.stepper
+    /// The rod itself, in space.
+    pub fn stepper(&mut self) -> &Stepper {
+        self.integrator.in_space()
     }
 
     /// The `count` lowest modes of small vibration about the present state, which is to be an equilibrium.
@@ -846,45 +643,24 @@ impl Unit {
     /// [`Error::NoEquilibrium`] if its stiffness is singular.
     pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
         let boundary = Boundary::hanging_from(*self.path.base(), self.gravity);
-        modes::modes(&mut self.stepper, &boundary, count).map_err(Error::NoEquilibrium)
+        modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
     fn read_out(&mut self) {
-        let Stepper { mesh, rod, state, .. } = &self.stepper;
-        let (tip, memory) = (state.tip(), state.tip_memory());
-        let angular_velocity = tip.rotation * memory.spin.velocity.value;
-        let Counts { steps, iterations, retries, order, step, error } = self.counts;
+        let integrator = &self.integrator;
+        let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
         self.outputs = Outputs {
-            tip_position: tip.position,
-            tip_orientation: so3::quaternion(&tip.rotation),
-            tip_velocity: memory.travel.velocity.value,
+            tip_position: position,
+            tip_orientation: so3::quaternion(&rotation),
+            tip_velocity: velocity,
             tip_angular_velocity: angular_velocity,
-            base_reaction_force: state.nodes[0].force,
-            base_reaction_moment: state.nodes[0].moment,
-            stations: self.stations.map(|at| state.position_within(mesh, rod, at.cell, at.theta)),
-            energy: self.energy,
-            steps,
-            iterations,
-            retries,
-            cells: mesh.cells.len() as i32,
-            order,
-            step,
-            error_estimate: error,
+            base_reaction_force: force,
+            base_reaction_moment: moment,
+            energy: *integrator.energy(),
+            cells: integrator.cells() as i32,
+            solver: *integrator.effort(),
+            ..self.outputs
         };
+        integrator.centreline(&mut self.outputs.stations);
     }
-}
-
-/// Points at equal arc lengths.
-fn stations(mesh: &Mesh) -> [Station; STATIONS] {
-    let mut stations = [Station::default(); STATIONS];
-    let (mut cell, mut start) = (0, 0.0);
-    for (i, station) in stations.iter_mut().enumerate() {
-        let s = mesh.length() * i as f64 / (STATIONS - 1) as f64;
-        while cell + 1 < mesh.cells.len() && s > start + mesh.cells[cell].length {
-            start += mesh.cells[cell].length;
-            cell += 1;
-        }
-        *station = Station { cell, theta: ((s - start) / mesh.cells[cell].length).min(1.0) };
-    }
-    stations
 }

@@ -237,5 +237,5 @@ fn a_short_stiff_rod_does_not_take_its_time() {
     let parameters = Parameters { length: 1e-3, ..Parameters::default() };
     let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
     unit.advance(&Inputs::default(), 0.01).unwrap();
-    assert!(unit.outputs().steps <= 1000, "{}", unit.outputs().steps);
+    assert!(unit.outputs().solver.steps <= 1000, "{}", unit.outputs().solver.steps);
 }

@@ -6,7 +6,7 @@
 
 use super::{Error as ValueError, Progress};
 use cosserat_rod::fmi2::description::{STEP_SIZE, STOP_TIME};
-use cosserat_rod::fmi2::variables::{self, Kind, Slot, Variable};
+use cosserat_rod::fmi2::variables::{self, Kind, Variable};
 use cosserat_rod::unit::{self, Inputs, Outputs, Parameters, Unit, Warning};
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
@@ -336,8 +336,5 @@ fn outputs(names: &[String]) -> Result<Vec<Variable>, Error> {
 /// With as many digits as it takes to read it back unchanged.
 fn text(column: &Variable, outputs: &Outputs) -> String {
     let value = column.computed(outputs).unwrap_or(f64::NAN);
-    match (column.kind(), column.row.slot) {
-        (Kind::Integer, Slot::IntegerOutput(at, _)) => at(outputs).to_string(),
-        _ => format!("{value:?}"),
-    }
+    if column.kind() == Kind::Real { format!("{value:?}") } else { format!("{value}") }
 }

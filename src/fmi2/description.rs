@@ -226,7 +226,7 @@ fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static str>) {
         Slot::Tunable(..) => ("parameter", "tunable", Some("exact")),
         Slot::Input(_) => ("input", "continuous", None),
         Slot::Output(..) => ("output", "continuous", Some("calculated")),
-        Slot::IntegerOutput(..) => ("output", "discrete", Some("calculated")),
+        Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => ("output", "discrete", Some("calculated")),
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::description::{self, ALL, LOG_CATEGORIES};
 use super::variables::{self, Kind, Variable};
+use crate::integrator::Effort;
 use crate::unit::{self, Allowed, Inputs, Parameters, Unit};
 use std::fmt;
 
@@ -464,8 +465,7 @@ impl Instance {
     }
 
     pub fn terminate(&mut self) -> Answer {
-        let outputs = self.unit()?.outputs();
-        let (steps, iterations, retries) = (outputs.steps, outputs.iterations, outputs.retries);
+        let Effort { steps, iterations, retries, .. } = self.unit()?.outputs().solver;
         self.mode = Mode::Terminated;
         Ok(Some(Note::Terminated { steps, iterations, retries }))
     }
@@ -546,9 +546,9 @@ impl Instance {
         let inputs = self.inputs.clone();
         let own_step = (time - self.time) + step_size;
         let unit = self.unit()?;
-        let retries = unit.outputs().retries;
+        let retries = unit.outputs().solver.retries;
         let warning = unit.advance(&inputs, own_step)?;
-        let retries = unit.outputs().retries - retries;
+        let retries = unit.outputs().solver.retries - retries;
         self.time = end;
         Ok(match warning {
             Some(warning) => Some(Note::Warning(warning)),

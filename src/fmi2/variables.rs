@@ -38,6 +38,8 @@ pub enum Slot {
     Output(fn(&Outputs, usize) -> f64, Initially),
     /// Computed.
     IntegerOutput(fn(&Outputs) -> i32, Initially),
+    /// Computed.
+    BooleanOutput(fn(&Outputs) -> bool, Initially),
 }
 
 /// What the value of an output at the end of initialisation depends on; the names are those of rows.
@@ -114,13 +116,13 @@ impl Variable {
         match self.row.slot {
             Slot::Parameter(_) | Slot::Tunable(_) | Slot::Input(_) | Slot::Output(..) => Kind::Real,
             Slot::IntegerParameter(_) | Slot::IntegerOutput(..) => Kind::Integer,
-            Slot::BooleanParameter(_) => Kind::Boolean,
+            Slot::BooleanParameter(_) | Slot::BooleanOutput(..) => Kind::Boolean,
         }
     }
 
     /// Whether it is computed.
     pub fn is_output(&self) -> bool {
-        matches!(self.row.slot, Slot::Output(..) | Slot::IntegerOutput(..))
+        matches!(self.row.slot, Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..))
     }
 
     /// Whether it may be set at communication points.
@@ -133,7 +135,7 @@ impl Variable {
         match self.row.slot {
             Slot::Parameter(_) | Slot::Tunable(_) | Slot::IntegerParameter(_) => Parameters::allowed(&self.to_string()),
             Slot::BooleanParameter(_) => Allowed::Choice(0, 1),
-            Slot::Input(_) | Slot::Output(..) | Slot::IntegerOutput(..) => Allowed::Finite,
+            Slot::Input(_) | Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => Allowed::Finite,
         }
     }
 
@@ -148,7 +150,9 @@ impl Variable {
     /// Whether the value of this output at the end of initialisation may depend on `known`.
     pub fn depends_initially_on(&self, known: &Variable) -> bool {
         match self.row.slot {
-            Slot::Output(_, initially) | Slot::IntegerOutput(_, initially) => initially.on(known.row.name),
+            Slot::Output(_, initially) | Slot::IntegerOutput(_, initially) | Slot::BooleanOutput(_, initially) => {
+                initially.on(known.row.name)
+            }
             _ => false,
         }
     }
@@ -160,7 +164,7 @@ impl Variable {
             Slot::IntegerParameter(at) => Some((*at(parameters)).into()),
             Slot::BooleanParameter(at) => Some(u8::from(*at(parameters)).into()),
             Slot::Input(at) => Some(*at(inputs, self.element)),
-            Slot::Output(..) | Slot::IntegerOutput(..) => None,
+            Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => None,
         }
     }
 
@@ -169,6 +173,7 @@ impl Variable {
         match self.row.slot {
             Slot::Output(at, _) => Some(at(outputs, self.element)),
             Slot::IntegerOutput(at, _) => Some(at(outputs).into()),
+            Slot::BooleanOutput(at, _) => Some(u8::from(at(outputs)).into()),
             _ => None,
         }
     }
@@ -181,7 +186,7 @@ impl Variable {
             Slot::IntegerParameter(at) => *at(parameters) = value as i32,
             Slot::BooleanParameter(at) => *at(parameters) = value != 0.0,
             Slot::Input(at) => *at(inputs, self.element) = value,
-            Slot::Output(..) | Slot::IntegerOutput(..) => {}
+            Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => {}
         }
     }
 }
@@ -218,13 +223,14 @@ const SHAPE: Initially = Initially::AllBut(&[
     "base.motion",
     "step",
     "spectral_radius",
+    "planar",
     "base.velocity",
     "base.angular_velocity",
 ]);
 /// Damping and the start in motion reach the accelerations, and these the reaction; only the time steps do not.
-const START: Initially = Initially::AllBut(&["step", "spectral_radius"]);
+const START: Initially = Initially::AllBut(&["step", "spectral_radius", "planar"]);
 
-use Slot::{BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
+use Slot::{BooleanOutput, BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
 
 /// The table.
 #[rustfmt::skip]
@@ -278,6 +284,10 @@ pub static ROWS: &[Row] = &[
         "Spectral radius of the time integrator at infinite frequency: 0 damps most, 1 nothing"),
     scalar("start_in_equilibrium", "", BooleanParameter(|p| &mut p.start_in_equilibrium),
         "Whether the run starts from the static equilibrium under gravity and the initial inputs instead of the rest shape"),
+    scalar("planar", "", BooleanParameter(|p| &mut p.planar),
+        "Whether the rod may be computed in a plane as long as it lies and moves in one, and all that acts on it leaves it there"),
+    scalar("quasi_static", "", BooleanParameter(|p| &mut p.quasi_static),
+        "Whether the rod goes from one static equilibrium to the next, without inertia and damping"),
 
     array("base.position", "m", XYZ, Input(|i, k| &mut i.base_position[k]),
         "Position of the base point, world frame"),
@@ -319,19 +329,21 @@ pub static ROWS: &[Row] = &[
         "Work the base has done on the rod since the start"),
     scalar("energy.work_tip", "J", Output(|o, _| o.energy.work_tip, Initially::Constant),
         "Work the tip force and moment have done on the rod since the start"),
-    scalar("solver.steps", "", IntegerOutput(|o| o.steps, Initially::Constant),
+    scalar("solver.steps", "", IntegerOutput(|o| o.solver.steps, Initially::Constant),
         "Internal steps since the start"),
-    scalar("solver.iterations", "", IntegerOutput(|o| o.iterations, START),
+    scalar("solver.iterations", "", IntegerOutput(|o| o.solver.iterations, START),
         "Newton iterations since the start, those of the start included"),
-    scalar("solver.retries", "", IntegerOutput(|o| o.retries, Initially::Constant),
+    scalar("solver.retries", "", IntegerOutput(|o| o.solver.retries, Initially::Constant),
         "Internal steps tried again since the start"),
     scalar("solver.cells", "", IntegerOutput(|o| o.cells, START),
         "Cells in use"),
-    scalar("solver.order", "", IntegerOutput(|o| o.order, Initially::Constant),
+    scalar("solver.order", "", IntegerOutput(|o| o.solver.order, Initially::Constant),
         "Order in time of the last internal step; 0 before the first"),
-    scalar("solver.step", "s", Output(|o, _| o.step, Initially::Constant),
+    scalar("solver.planar", "", BooleanOutput(|o| o.solver.planar, Initially::Constant),
+        "Whether the last internal step was in a plane"),
+    scalar("solver.step", "s", Output(|o, _| o.solver.step, Initially::Constant),
         "Length of the last internal step"),
-    scalar("solver.error_estimate", "", Output(|o, _| o.error_estimate, Initially::Constant),
+    scalar("solver.error_estimate", "", Output(|o, _| o.solver.error, Initially::Constant),
         "Sum of the internal steps' estimated errors of the centreline since the start, over the length; 0 where the parameter step gives their length"),
 ];
 
@@ -374,7 +386,9 @@ mod tests {
     #[test]
     fn dependencies_name_rows() {
         for row in ROWS {
-            let (Output(_, initially) | IntegerOutput(_, initially)) = row.slot else { continue };
+            let (Output(_, initially) | IntegerOutput(_, initially) | BooleanOutput(_, initially)) = row.slot else {
+                continue;
+            };
             let Initially::AllBut(names) = initially else { continue };
             for name in names {
                 assert!(ROWS.iter().any(|row| row.name == *name), "{name}");

@@ -1,0 +1,571 @@
+//! A rod moved to a tolerance: what model it needs and how long its steps may be, it finds out by itself.
+//!
+//! What acts on the rod is a function of the time since the beginning of an interval, and steps land on its end. Left to
+//! itself the rod takes steps of order 4, as long as their estimated error allows:
+//!
+//! - in its plane ([`crate::plane`]), as long as it lies and moves in one and all that acts on it leaves it there;
+//! - else in space ([`Stepper::attempt`]), where a step that Newton loses is shortened, and the shortest of all taken by
+//!   implicit Euler, which damps what it cannot follow.
+//!
+//! Where the length of the steps is given, and for a rod that shears and stretches, they are generalized-α in space. One
+//! of those that diverges is halved, and its halves again if need be; if that does not help either, the rod is as it was
+//! before the interval.
+
+use crate::alpha::Scheme;
+use crate::boundary::{Boundary, Drive};
+use crate::energy::Energy;
+use crate::plane::{Kept, Plane, Tip};
+use crate::pose::{Row, State};
+use crate::rosenbrock::RODAS4;
+use crate::runge_kutta;
+use crate::stepper::{Attempt, Diverged, Stepper};
+use nalgebra::{Matrix3, Vector3};
+
+type Vec3 = Vector3<f64>;
+
+/// Most steps chosen for an interval.
+const MAX_CHOSEN_STEPS: f64 = 1000.0;
+/// Length of the next step over one that Newton has lost.
+const LOST: f64 = 0.3;
+/// Halvings of a step before it is given up.
+const MAX_HALVINGS: u32 = 12;
+/// Part of the step that the estimate would allow which is taken, so that few are refused.
+const SAFETY: f64 = 0.9;
+/// Bounds of the change from one step to the next.
+const CHANGE: (f64, f64) = (0.2, 4.0);
+
+/// Estimated error of the steps in the time that gravity or stiffness take to move the whole rod, over the tolerance; in
+/// space. A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
+const SPACE_SHARE: f64 = 0.2;
+/// The same in a plane.
+const PLANE_SHARE: f64 = 0.2;
+/// The first step over that time: short enough to be accepted, and the next ones follow their error.
+const FIRST_STEP: f64 = 1.0 / 80.0;
+/// The shortest step of order 4 over the step of generalized-α for the same tolerance.
+const SHORTEST_STEP: f64 = 0.1;
+
+/// How a rod is to be moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Way {
+    /// As accurately as asked; for rods that neither shear nor stretch.
+    Accurate {
+        /// Of the position of the tip, over the length.
+        tolerance: f64,
+        /// The shortest time in which gravity or stiffness move the whole rod, s.
+        time: f64,
+        /// Whether it may be in a plane.
+        planar: bool,
+    },
+    /// By equal steps of generalized-α.
+    Equal,
+    /// From one equilibrium to the next, without inertia and damping.
+    Static,
+}
+
+/// An interval that could not be integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Failed {
+    /// Time since the beginning of the interval, s.
+    pub time: f64,
+    /// The smallest step tried, s.
+    pub step: f64,
+    /// How it ended.
+    pub cause: Diverged,
+}
+
+/// The work done since the start, and what is in use.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
+    /// Steps.
+    pub steps: i32,
+    /// Newton iterations.
+    pub iterations: i32,
+    /// Steps that had to be tried again.
+    pub retries: i32,
+    /// Order in time of the last step; 0 before the first, and of statics.
+    pub order: i32,
+    /// Length of the last step, s.
+    pub step: f64,
+    /// Whether the last step was in a plane.
+    pub planar: bool,
+    /// Sum of the estimated errors of the centreline, over the length; none are estimated where the length of the steps
+    /// is given.
+    pub error: f64,
+}
+
+/// The ends of the rod, world frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ends {
+    /// Of the tip, m.
+    pub position: Vec3,
+    /// Of the section at the tip.
+    pub rotation: Matrix3<f64>,
+    /// Of the tip, m/s.
+    pub velocity: Vec3,
+    /// Of the section at the tip, rad/s.
+    pub angular_velocity: Vec3,
+    /// Exerted on the base, N.
+    pub force: Vec3,
+    /// Exerted on the base, about the base point, N·m.
+    pub moment: Vec3,
+}
+
+/// How long the steps of a model may be.
+#[derive(Clone, Copy, Debug)]
+struct Pace {
+    /// Error they may have in a second, over the length.
+    allowed: f64,
+    /// The next one, if its error allows, s.
+    next: f64,
+    /// The shortest, s: what is faster than that is damped, not followed.
+    shortest: f64,
+}
+
+impl Pace {
+    /// The length of the next step of an interval of which `rest` s are left, and whether it is the last one.
+    fn step(&self, rest: f64) -> (f64, bool) {
+        let parts = (rest / self.next.max(self.shortest)).ceil().max(1.0);
+        (rest / parts, parts == 1.0)
+    }
+
+    /// Whether a step of `dt` s with the estimated error `error` is good enough; and sets the next one.
+    fn allows(&mut self, dt: f64, error: f64) -> bool {
+        let part = error / (self.allowed * dt);
+        self.next = dt * stretch(part);
+        part <= 1.0
+    }
+}
+
+/// How much longer the next step may be than one with the error `part`, as a part of what is allowed; steps are allowed
+/// errors in proportion to their length.
+fn stretch(part: f64) -> f64 {
+    if !part.is_finite() {
+        return LOST;
+    }
+    // the estimate goes with h⁴, what is allowed with h
+    (SAFETY * part.max(1e-12).powf(-1.0 / 3.0)).clamp(CHANGE.0, CHANGE.1)
+}
+
+/// How a step of generalized-α is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// As suits it.
+    Fitting,
+    /// By implicit Euler and the accelerations of the positions: what cannot be followed rests, whatever the step.
+    Damped,
+}
+
+/// A rod that may be in a plane.
+#[derive(Clone, Debug)]
+struct Planar {
+    plane: Plane,
+    kept: Kept,
+    pace: Pace,
+}
+
+/// A rod and its motion, to a tolerance.
+#[derive(Clone, Debug)]
+pub struct Integrator {
+    stepper: Stepper,
+    /// Whether the rod is in its plane; else it is the stepper's.
+    in_plane: bool,
+    planar: Option<Planar>,
+    way: Way,
+    scheme: Scheme,
+    /// Longest step of generalized-α, s.
+    step: f64,
+    /// Of the steps in space whose error chooses their length.
+    pace: Pace,
+    energy: Energy,
+    effort: Effort,
+    /// What it was before the interval.
+    before: (bool, Energy, Effort),
+    state_before: State,
+}
+
+impl Integrator {
+    /// A rod that starts from the stepper's state under `boundary`. `step`, s, and `scheme` are those of generalized-α.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the equations of motion at the start are singular.
+    pub fn new(
+        mut stepper: Stepper,
+        way: Way,
+        scheme: Scheme,
+        step: f64,
+        boundary: &Boundary,
+    ) -> Result<Self, Diverged> {
+        let way = if stepper.rod.is_extensible() && way != Way::Static { Way::Equal } else { way };
+        if way != Way::Static {
+            stepper.start(boundary)?;
+        }
+        let (tolerance, time, planar) = match way {
+            Way::Accurate { tolerance, time, planar } => (tolerance, time, planar),
+            Way::Equal | Way::Static => (0.0, 0.0, false),
+        };
+        let pace = |share: f64| Pace {
+            allowed: share * tolerance / time,
+            next: time * FIRST_STEP,
+            shortest: SHORTEST_STEP * step,
+        };
+        let planar = planar.then(|| {
+            let plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
+            Planar { kept: plane.kept(), plane, pace: pace(PLANE_SHARE) }
+        });
+        let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
+        let effort = Effort::default();
+        Ok(Self {
+            in_plane: false,
+            planar,
+            way,
+            scheme,
+            step,
+            pace: pace(SPACE_SHARE),
+            energy,
+            effort,
+            before: (false, energy, effort),
+            state_before: stepper.state.clone(),
+            stepper,
+        })
+    }
+
+    /// Advances over an interval of `duration` s under `drive`.
+    ///
+    /// # Errors
+    /// [`Failed`]; the rod is then exactly as before.
+    pub fn advance(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        self.keep();
+        let paces = (self.pace, self.planar.as_ref().map(|planar| planar.pace));
+        let done = match self.way {
+            Way::Accurate { .. } => self.follow(drive, duration),
+            Way::Equal => self.march(drive, duration),
+            Way::Static => self.rest(drive, 0.0, duration, 0),
+        };
+        if done.is_err() {
+            self.restore();
+            self.pace = paces.0;
+            if let (Some(planar), Some(pace)) = (&mut self.planar, paces.1) {
+                planar.pace = pace;
+            }
+        }
+        done
+    }
+
+    fn keep(&mut self) {
+        self.before = (self.in_plane, self.energy, self.effort);
+        match &mut self.planar {
+            Some(Planar { plane, kept, .. }) if self.in_plane => plane.keep(kept),
+            _ => self.state_before.copy_from(&self.stepper.state),
+        }
+    }
+
+    fn restore(&mut self) {
+        (self.in_plane, self.energy, self.effort) = self.before;
+        match &mut self.planar {
+            Some(Planar { plane, kept, .. }) if self.in_plane => plane.restore(kept),
+            _ => self.stepper.state.copy_from(&self.state_before),
+        }
+    }
+
+    /// An interval in equal steps of generalized-α.
+    fn march(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        // a host's round-off does not cost a step
+        let steps = (duration / self.step * (1.0 - 1e-9)).ceil().max(1.0);
+        let dt = duration / steps;
+        let mut i = 0.0;
+        while i < steps {
+            self.step(drive, Kind::Fitting, i * dt, dt, 0)?;
+            i += 1.0;
+        }
+        Ok(())
+    }
+
+    /// An interval in steps of order 4.
+    fn follow(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        self.choose(drive, duration);
+        let time = if self.in_plane { self.follow_in_plane(drive, duration) } else { 0.0 };
+        self.follow_in_space(drive, time, duration)
+    }
+
+    /// Enters or leaves a plane, as all that acts in the interval makes it.
+    fn choose(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) {
+        let Some(Planar { plane, .. }) = &mut self.planar else { return };
+        let begin = drive(0.0);
+        // velocities on a smooth path are parabolas, here at least: three of them decide
+        let ahead = [drive(0.5 * duration), drive(duration)];
+        let holds = |plane: &Plane| plane.holds(&begin) && ahead.iter().all(|drive| plane.holds(drive));
+        let mut entered = false;
+        if self.in_plane && !holds(plane) {
+            plane.write(&mut self.stepper.state);
+            self.in_plane = false;
+        }
+        if !self.in_plane {
+            entered = plane.enter(&self.stepper.state, &begin) && holds(plane);
+            self.in_plane = entered;
+        }
+        if self.in_plane && (entered || has_jumped(plane.drive(), &begin)) && plane.start(&begin).is_err() {
+            if !entered {
+                plane.write(&mut self.stepper.state);
+            }
+            self.in_plane = false;
+        }
+    }
+
+    /// Follows in the plane as long as the steps need not be too short, and returns how far that was, s; beyond that the
+    /// rod is in space.
+    fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> f64 {
+        let Some(Planar { plane, pace, .. }) = &mut self.planar else { return 0.0 };
+        let begin = drive(0.0);
+        let works = plane.is_lossy() || acts(&begin) || acts(&drive(duration));
+        if works {
+            plane.look(1.0, &begin);
+        }
+        let shortest = pace.shortest.max(duration / MAX_CHOSEN_STEPS);
+        let mut time = 0.0;
+        while time < duration {
+            let (dt, last) = Pace { shortest, ..*pace }.step(duration - time);
+            let at = |since: f64| drive(time + since);
+            let error = plane.attempt(&at, dt).map_or(f64::NAN, |estimate| estimate.position);
+            if !pace.allows(dt, error) {
+                self.effort.retries = self.effort.retries.saturating_add(1);
+                if dt > shortest {
+                    continue;
+                }
+                plane.write(&mut self.stepper.state);
+                self.in_plane = false;
+                return time;
+            }
+            let begin = plane.power();
+            plane.accept();
+            if works {
+                plane.look(0.5, &at(0.5 * dt));
+                let middle = plane.power();
+                plane.look(1.0, &at(dt));
+                // Simpson's rule
+                let work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
+                self.energy = self.energy.worked(&work);
+            }
+            self.effort.took(runge_kutta::ORDER, dt, error);
+            self.effort.planar = true;
+            time = if last { duration } else { time + dt };
+        }
+        plane.look(1.0, &drive(duration));
+        self.energy = self.energy.now(&plane.energy());
+        duration
+    }
+
+    /// Follows in space from `time` on, as long as the error allows; steps of generalized-α take over where they would be
+    /// too many.
+    fn follow_in_space(&mut self, drive: &impl Fn(f64) -> Drive, mut time: f64, duration: f64) -> Result<(), Failed> {
+        let shortest = self.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
+        while time < duration {
+            let (dt, last) = Pace { shortest, ..self.pace }.step(duration - time);
+            let tried = match self.attempt(drive, time, dt) {
+                Ok(Attempt { iterations, error, work }) => {
+                    self.effort.iterated(iterations);
+                    // what the shortest step cannot follow it damps, and the estimate tells the error
+                    let good = self.pace.allows(dt, error) || dt <= shortest;
+                    if good {
+                        self.stepper.accept();
+                        let Stepper { mesh, rod, state, .. } = &self.stepper;
+                        self.energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
+                        self.effort.took(runge_kutta::ORDER, dt, error);
+                    }
+                    good
+                }
+                Err(diverged) => {
+                    self.effort.iterated(diverged.iterations);
+                    self.pace.next = dt * LOST;
+                    false
+                }
+            };
+            if !tried {
+                self.effort.retries = self.effort.retries.saturating_add(1);
+                if dt > shortest {
+                    continue;
+                }
+                self.step(drive, Kind::Damped, time, dt, 0)?;
+                self.pace.next = shortest;
+            }
+            time = if last { duration } else { time + dt };
+        }
+        Ok(())
+    }
+
+    /// A step of order 4 in space from `time` on, with the accelerations made consistent first where they are not.
+    fn attempt(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64) -> Result<Attempt, Diverged> {
+        let begin = drive(time).boundary;
+        let before = &self.stepper.state.boundary;
+        let jumped = (before.tip_force, before.tip_moment, before.gravity, before.base.acceleration)
+            != (begin.tip_force, begin.tip_moment, begin.gravity, begin.base.acceleration);
+        if jumped || self.stepper.state.dt > 0.0 {
+            self.stepper.accelerate(&begin)?;
+        }
+        let accuracy = self.pace.allowed * dt;
+        self.stepper.attempt(&|since: f64| drive(time + since).boundary, dt, accuracy)
+    }
+
+    /// One generalized-α step from `time`, or its two halves.
+    fn step(
+        &mut self,
+        drive: &impl Fn(f64) -> Drive,
+        kind: Kind,
+        time: f64,
+        dt: f64,
+        halvings: u32,
+    ) -> Result<(), Failed> {
+        let boundary = drive(time + dt).boundary;
+        let report = match kind {
+            Kind::Fitting => self.stepper.advance(&boundary, self.scheme, dt),
+            Kind::Damped => self.stepper.step(&boundary, Scheme::BACKWARD_EULER, dt, Row::Positions),
+        };
+        match report {
+            Ok(report) => {
+                self.effort.iterated(report.iterations);
+                let second = self.stepper.state.scheme.is_second_order();
+                self.effort.took(if second { 2 } else { 1 }, dt, 0.0);
+                let Stepper { mesh, rod, state, .. } = &self.stepper;
+                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
+                Ok(())
+            }
+            Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
+            Err(cause) => {
+                self.effort.retries = self.effort.retries.saturating_add(1);
+                self.effort.iterated(cause.iterations);
+                self.step(drive, kind, time, 0.5 * dt, halvings + 1)?;
+                self.step(drive, kind, time + 0.5 * dt, 0.5 * dt, halvings + 1)
+            }
+        }
+    }
+
+    /// The equilibrium `dt` s after `time`, by way of those in between if need be.
+    fn rest(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64, halvings: u32) -> Result<(), Failed> {
+        let boundary = drive(time + dt).boundary;
+        match self.stepper.drift(&boundary, dt) {
+            Ok(report) => {
+                self.effort.iterated(report.iterations);
+                self.effort.took(0, dt, 0.0);
+                let Stepper { mesh, rod, state, .. } = &self.stepper;
+                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
+                Ok(())
+            }
+            Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
+            Err(cause) => {
+                self.effort.retries = self.effort.retries.saturating_add(1);
+                self.effort.iterated(cause.iterations);
+                self.rest(drive, time, 0.5 * dt, halvings + 1)?;
+                self.rest(drive, time + 0.5 * dt, 0.5 * dt, halvings + 1)
+            }
+        }
+    }
+
+    /// The ends of the rod at present.
+    pub fn ends(&self) -> Ends {
+        if let Some(plane) = self.plane() {
+            let (Tip { position, velocity, rotation, angular_velocity }, (force, moment)) =
+                (plane.tip(), plane.reaction());
+            return Ends { position, rotation, velocity, angular_velocity, force, moment };
+        }
+        let state = &self.stepper.state;
+        let (tip, memory, base) = (state.tip(), state.tip_memory(), &state.nodes[0]);
+        Ends {
+            position: tip.position,
+            rotation: tip.rotation,
+            velocity: memory.travel.velocity.value,
+            angular_velocity: tip.rotation * memory.spin.velocity.value,
+            force: base.force,
+            moment: base.moment,
+        }
+    }
+
+    /// Fills `points` with the centreline at equal arc lengths from the base to the tip, m, world frame.
+    pub fn centreline(&self, points: &mut [Vec3]) {
+        let Stepper { mesh, rod, state, .. } = &self.stepper;
+        let parts = (points.len() - 1).max(1) as f64;
+        let (mut cell, mut start) = (0, 0.0);
+        for (i, point) in points.iter_mut().enumerate() {
+            let arc = mesh.length() * i as f64 / parts;
+            while cell + 1 < mesh.cells.len() && arc > start + mesh.cells[cell].length {
+                start += mesh.cells[cell].length;
+                cell += 1;
+            }
+            let fraction = ((arc - start) / mesh.cells[cell].length).min(1.0);
+            *point = match self.plane() {
+                Some(plane) => plane.position_within(cell, fraction),
+                None => state.position_within(mesh, rod, cell, fraction),
+            };
+        }
+    }
+
+    fn plane(&self) -> Option<&Plane> {
+        self.planar.as_ref().filter(|_| self.in_plane).map(|planar| &planar.plane)
+    }
+
+    /// Its energies at present, and works and losses since the start.
+    pub fn energy(&self) -> &Energy {
+        &self.energy
+    }
+
+    /// What it took so far.
+    pub fn effort(&self) -> &Effort {
+        &self.effort
+    }
+
+    /// The cells along the rod.
+    pub fn cells(&self) -> usize {
+        self.stepper.mesh.cells.len()
+    }
+
+    /// Arc length of the rod, m.
+    pub fn length(&self) -> f64 {
+        self.stepper.mesh.length()
+    }
+
+    /// The rod in space at present, wherever it is.
+    pub fn in_space(&mut self) -> &mut Stepper {
+        if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
+            plane.write(&mut self.stepper.state);
+        }
+        &mut self.stepper
+    }
+}
+
+/// Whether loads or accelerations of the base are not those that the rod's accelerations belong to.
+fn has_jumped(before: &Drive, now: &Drive) -> bool {
+    let acting = |drive: &Drive| {
+        let Boundary { base, tip_force, tip_moment, gravity, .. } = drive.boundary;
+        (tip_force, tip_moment, gravity, base.acceleration, drive.rates.angular_acceleration)
+    };
+    acting(before) != acting(now)
+}
+
+/// Whether work is done on the ends.
+fn acts(drive: &Drive) -> bool {
+    let Boundary { base, tip_force, tip_moment, .. } = &drive.boundary;
+    [base.velocity, base.angular_velocity, *tip_force, *tip_moment].iter().any(|vector| *vector != Vec3::zeros())
+}
+
+impl Effort {
+    fn iterated(&mut self, iterations: usize) {
+        self.iterations = self.iterations.saturating_add(iterations as i32);
+    }
+
+    fn took(&mut self, order: i32, dt: f64, error: f64) {
+        self.steps = self.steps.saturating_add(1);
+        (self.order, self.step, self.planar) = (order, dt, false);
+        self.error += error;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_follow_their_error() {
+        assert_eq!(stretch(0.0), CHANGE.1);
+        assert_eq!(stretch(1e30), CHANGE.0);
+        assert_eq!(stretch(f64::NAN), LOST);
+        assert!((stretch(1.0) - SAFETY).abs() < 1e-15);
+    }
+}
