@@ -14,6 +14,7 @@
 use crate::alpha::Scheme;
 use crate::boundary::{Boundary, Drive};
 use crate::energy::Energy;
+use crate::lateral::Disturbance;
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
 use crate::rosenbrock::RODAS4;
@@ -43,6 +44,19 @@ const PLANE_SHARE: f64 = 0.2;
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance.
 const SHORTEST_STEP: f64 = 0.1;
+
+/// Steps in a plane after which the disturbance out of it is carried on, at the earliest: what buckles takes many more.
+const STEPS_UNWATCHED: u32 = 8;
+/// The same as a part of the time in which gravity or stiffness move the whole rod: the forces of the shortest waves,
+/// which change faster, move a rod that whips by nothing, but would make the disturbance of intervals grow.
+const TIME_UNWATCHED: f64 = 0.02;
+/// Growth of the disturbance at which the rod leaves the plane. What does not buckle lets it fall: rods that are released,
+/// and whip, among others.
+const GROWN: f64 = 1e5;
+/// Size at which the disturbance begins anew, lest a rod that was quiet for long is quick to buckle unseen.
+const FADED: f64 = 0.01;
+/// The size that the disturbance had at first, rad; about the roundings of a rod in space.
+const ROUNDINGS: f64 = 1e-12;
 
 /// How a rod is to be moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,6 +175,41 @@ struct Planar {
     plane: Plane,
     kept: Kept,
     pace: Pace,
+    disturbance: Disturbance,
+    /// Time, s, and steps since the disturbance was carried on.
+    unwatched: (f64, u32),
+    /// The shortest time after which it is, s.
+    watch: f64,
+    /// Three of these three before the interval.
+    before: (Pace, Disturbance, (f64, u32)),
+}
+
+impl Planar {
+    /// Counts a step of `dt` s, and tells whether the disturbance is to be carried on after it.
+    fn is_due(&mut self, dt: f64) -> bool {
+        let (time, steps) = &mut self.unwatched;
+        *time += dt;
+        *steps += 1;
+        *steps >= STEPS_UNWATCHED && *time >= self.watch
+    }
+
+    /// Carries the disturbance on to where the plane looks at, and tells whether the rod would stay in it.
+    fn stays(&mut self) -> bool {
+        let (time, _) = std::mem::take(&mut self.unwatched);
+        if self.disturbance.size() < FADED {
+            self.disturbance.begin(&self.plane);
+        }
+        self.disturbance.advance(&self.plane, time) && self.disturbance.size() < GROWN
+    }
+}
+
+/// What a rod was before an interval, besides its state.
+#[derive(Clone, Copy, Debug)]
+struct Before {
+    in_plane: bool,
+    pace: Pace,
+    energy: Energy,
+    effort: Effort,
 }
 
 /// A rod and its motion, to a tolerance.
@@ -178,8 +227,7 @@ pub struct Integrator {
     pace: Pace,
     energy: Energy,
     effort: Effort,
-    /// What it was before the interval.
-    before: (bool, Energy, Effort),
+    before: Before,
     state_before: State,
 }
 
@@ -210,7 +258,17 @@ impl Integrator {
         };
         let planar = planar.then(|| {
             let plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
-            Planar { kept: plane.kept(), plane, pace: pace(PLANE_SHARE) }
+            let disturbance = Disturbance::new(stepper.mesh.points());
+            let (pace, unwatched) = (pace(PLANE_SHARE), (0.0, 0));
+            Planar {
+                kept: plane.kept(),
+                before: (pace, disturbance.clone(), unwatched),
+                plane,
+                pace,
+                disturbance,
+                unwatched,
+                watch: TIME_UNWATCHED * time,
+            }
         });
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
         let effort = Effort::default();
@@ -220,10 +278,10 @@ impl Integrator {
             way,
             scheme,
             step,
+            before: Before { in_plane: false, pace: pace(SPACE_SHARE), energy, effort },
             pace: pace(SPACE_SHARE),
             energy,
             effort,
-            before: (false, energy, effort),
             state_before: stepper.state.clone(),
             stepper,
         })
@@ -235,7 +293,6 @@ impl Integrator {
     /// [`Failed`]; the rod is then exactly as before.
     pub fn advance(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
         self.keep();
-        let paces = (self.pace, self.planar.as_ref().map(|planar| planar.pace));
         let done = match self.way {
             Way::Accurate { .. } => self.follow(drive, duration),
             Way::Equal => self.march(drive, duration),
@@ -243,26 +300,34 @@ impl Integrator {
         };
         if done.is_err() {
             self.restore();
-            self.pace = paces.0;
-            if let (Some(planar), Some(pace)) = (&mut self.planar, paces.1) {
-                planar.pace = pace;
-            }
         }
         done
     }
 
     fn keep(&mut self) {
-        self.before = (self.in_plane, self.energy, self.effort);
+        let Self { in_plane, pace, energy, effort, .. } = *self;
+        self.before = Before { in_plane, pace, energy, effort };
         match &mut self.planar {
-            Some(Planar { plane, kept, .. }) if self.in_plane => plane.keep(kept),
+            Some(planar) if in_plane => {
+                planar.plane.keep(&mut planar.kept);
+                let (pace, disturbance, unwatched) = &mut planar.before;
+                (*pace, *unwatched) = (planar.pace, planar.unwatched);
+                disturbance.copy_from(&planar.disturbance);
+            }
             _ => self.state_before.copy_from(&self.stepper.state),
         }
     }
 
     fn restore(&mut self) {
-        (self.in_plane, self.energy, self.effort) = self.before;
+        let Before { in_plane, pace, energy, effort } = self.before;
+        (self.in_plane, self.pace, self.energy, self.effort) = (in_plane, pace, energy, effort);
         match &mut self.planar {
-            Some(Planar { plane, kept, .. }) if self.in_plane => plane.restore(kept),
+            Some(planar) if in_plane => {
+                planar.plane.restore(&planar.kept);
+                let (pace, disturbance, unwatched) = &planar.before;
+                (planar.pace, planar.unwatched) = (*pace, *unwatched);
+                planar.disturbance.copy_from(disturbance);
+            }
             _ => self.stepper.state.copy_from(&self.state_before),
         }
     }
@@ -289,7 +354,7 @@ impl Integrator {
 
     /// Enters or leaves a plane, as all that acts in the interval makes it.
     fn choose(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) {
-        let Some(Planar { plane, .. }) = &mut self.planar else { return };
+        let Some(Planar { plane, disturbance, unwatched, .. }) = &mut self.planar else { return };
         let begin = drive(0.0);
         // velocities on a smooth path are parabolas, here at least: three of them decide
         let ahead = [drive(0.5 * duration), drive(duration)];
@@ -302,6 +367,10 @@ impl Integrator {
         if !self.in_plane {
             entered = plane.enter(&self.stepper.state, &begin) && holds(plane);
             self.in_plane = entered;
+            if entered {
+                disturbance.begin(plane);
+                *unwatched = (0.0, 0);
+            }
         }
         if self.in_plane && (entered || has_jumped(plane.drive(), &begin)) && plane.start(&begin).is_err() {
             if !entered {
@@ -314,44 +383,52 @@ impl Integrator {
     /// Follows in the plane as long as the steps need not be too short, and returns how far that was, s; beyond that the
     /// rod is in space.
     fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> f64 {
-        let Some(Planar { plane, pace, .. }) = &mut self.planar else { return 0.0 };
+        let Some(planar) = &mut self.planar else { return 0.0 };
         let begin = drive(0.0);
-        let works = plane.is_lossy() || acts(&begin) || acts(&drive(duration));
+        let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
         if works {
-            plane.look(1.0, &begin);
+            planar.plane.look(1.0, &begin);
         }
-        let shortest = pace.shortest.max(duration / MAX_CHOSEN_STEPS);
+        let shortest = planar.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
         let mut time = 0.0;
         while time < duration {
-            let (dt, last) = Pace { shortest, ..*pace }.step(duration - time);
+            let (dt, last) = Pace { shortest, ..planar.pace }.step(duration - time);
             let at = |since: f64| drive(time + since);
-            let error = plane.attempt(&at, dt).map_or(f64::NAN, |estimate| estimate.position);
-            if !pace.allows(dt, error) {
+            let error = planar.plane.attempt(&at, dt).map_or(f64::NAN, |estimate| estimate.position);
+            if !planar.pace.allows(dt, error) {
                 self.effort.retries = self.effort.retries.saturating_add(1);
                 if dt > shortest {
                     continue;
                 }
-                plane.write(&mut self.stepper.state);
+                planar.plane.write(&mut self.stepper.state);
                 self.in_plane = false;
                 return time;
             }
-            let begin = plane.power();
-            plane.accept();
-            if works {
-                plane.look(0.5, &at(0.5 * dt));
-                let middle = plane.power();
-                plane.look(1.0, &at(dt));
-                // Simpson's rule
-                let work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
-                self.energy = self.energy.worked(&work);
-            }
+            let begin = planar.plane.power();
+            planar.plane.accept();
             self.effort.took(runge_kutta::ORDER, dt, error);
             self.effort.planar = true;
+            let due = planar.is_due(dt);
+            if works {
+                planar.plane.look(0.5, &at(0.5 * dt));
+                let middle = planar.plane.power();
+                planar.plane.look(1.0, &at(dt));
+                // Simpson's rule
+                let work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(planar.plane.power(), dt / 6.0);
+                self.energy = self.energy.worked(&work);
+            } else if due || last {
+                planar.plane.look(1.0, &at(dt));
+            }
             time = if last { duration } else { time + dt };
+            if due && !planar.stays() {
+                planar.plane.write(&mut self.stepper.state);
+                planar.disturbance.disturb(&planar.plane, ROUNDINGS, &mut self.stepper.state);
+                self.in_plane = false;
+                break;
+            }
         }
-        plane.look(1.0, &drive(duration));
-        self.energy = self.energy.now(&plane.energy());
-        duration
+        self.energy = self.energy.now(&planar.plane.energy());
+        time
     }
 
     /// Follows in space from `time` on, as long as the error allows; steps of generalized-α take over where they would be

@@ -22,7 +22,7 @@
 //! fails. The integrator and the unit know neither [`rate`] nor [`formulation`].
 //!
 //! A rod that stays in a plane has in [`plane`] a third way: an ordinary differential equation in its angles alone, on the
-//! same rods, meshes and ends, which [`rosenbrock`] integrates. [`integrator`] chooses between that and the rod in space.
+//! same rods, meshes and ends, which [`rosenbrock`] integrates; [`lateral`] tells whether it would stay there. [`integrator`] chooses between that and the rod in space.
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
@@ -64,6 +64,7 @@ pub mod boundary;
 pub mod pose;
 pub mod energy;
 pub mod plane;
+pub mod lateral;
 pub mod stepper;
 pub mod formulation;
 pub mod rate;

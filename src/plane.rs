@@ -311,6 +311,36 @@ pub struct Tip {
     pub angular_velocity: Vec3,
 }
 
+/// What a motion out of the plane would meet at a Gauss point, in the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slice {
+    /// Of the rod, by the weight of the point, m.
+    pub length: f64,
+    /// d.
+    pub tangent: [f64; 2],
+    /// n, N.
+    pub force: [f64; 2],
+    /// m, N·m.
+    pub moment: f64,
+}
+
+/// The rod's numbers out of the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lateral {
+    /// EI about d⊥, N·m².
+    pub bending: f64,
+    /// GJ, N·m².
+    pub twist: f64,
+    /// ρA, kg/m.
+    pub mass: f64,
+    /// ρI about d and about d⊥, kg·m.
+    pub inertia: [f64; 2],
+    /// Of the body at the tip, kg.
+    pub tip_mass: f64,
+    /// Of the same, kg·m².
+    pub tip_inertia: f64,
+}
+
 /// The fields of a cell at the instant that is looked at; those of its first node, the rest at the points.
 #[derive(Clone, Debug, Default)]
 struct Field {
@@ -1113,6 +1143,40 @@ impl Plane {
         let [x, y] = field.node.position;
         let way = [x + length * total(&weights, &field.cos), y + length * total(&weights, &field.sin)];
         self.looked_at.base.position + self.frame.vector(way)
+    }
+
+    /// The Gauss points from the base to the tip.
+    pub fn slices(&self) -> impl DoubleEndedIterator<Item = Slice> + ExactSizeIterator {
+        let stages = self.mesh.rule.stages;
+        (0..self.mesh.points()).map(move |i| {
+            let (field, k) = (&self.fields[i / stages], i % stages);
+            Slice {
+                length: self.cells[i / stages].length * self.rule.b[k],
+                tangent: [field.cos[k], field.sin[k]],
+                force: [field.force[0][k], field.force[1][k]],
+                moment: field.moment[k],
+            }
+        })
+    }
+
+    /// The rod out of the plane.
+    pub fn lateral(&self) -> Lateral {
+        let across = Vec3::z().cross(&self.frame.axis);
+        let about = |numbers: &Vec3| numbers.component_mul(&across).dot(&across);
+        let Rod { stiffness, inertia_per_length, mass_per_length, tip_mass, tip_inertia, .. } = &self.rod;
+        Lateral {
+            bending: about(stiffness),
+            twist: stiffness.z,
+            mass: *mass_per_length,
+            inertia: [inertia_per_length.z, about(inertia_per_length)],
+            tip_mass: *tip_mass,
+            tip_inertia: *tip_inertia,
+        }
+    }
+
+    /// A vector in the plane, in the world frame.
+    pub fn in_world(&self, part: [f64; 2]) -> Vec3 {
+        self.frame.vector(part)
     }
 
     /// Whether energy is lost in it, in damping or drag.
