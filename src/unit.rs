@@ -334,6 +334,10 @@ const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance.
 const SHORTEST_STEP: f64 = 0.1;
 
+/// Energy that a step may gain, relative, over the error it may have: those that follow the motion gain up to 10 times that,
+/// those that pass the end of a rotation vector 1000 times and more.
+const GAIN: f64 = 30.0;
+
 /// Most internal steps chosen for a communication step.
 const MAX_AUTOMATIC_STEPS: f64 = 1000.0;
 
@@ -387,6 +391,8 @@ struct Pace {
     next: f64,
     /// The shortest, s: what is faster than that is damped, not followed.
     shortest: f64,
+    /// What gravity and bending can give the rod, J.
+    energy: f64,
 }
 
 /// How a step of generalized-α is taken.
@@ -531,6 +537,7 @@ impl Parameters {
             allowed: ERROR_SHARE * tolerance / time,
             next: time * FIRST_STEP,
             shortest: SHORTEST_STEP * self.longest_step(rod, tolerance),
+            energy: rod.mass_per_length * self.gravity.norm() * self.length.powi(2) + rod.stiffness.max() / self.length,
         })
     }
 }
@@ -699,7 +706,7 @@ impl Unit {
     /// A communication step in steps of order 4, as long as their error allows; steps of generalized-α take over where
     /// they would be too many.
     fn follow(&mut self, segment: &Segment, inputs: &Inputs, step_size: f64, pace: Pace) -> Result<(), Error> {
-        let Pace { allowed, mut next, shortest } = pace;
+        let Pace { allowed, mut next, shortest, energy: large } = pace;
         let gravity = self.gravity;
         let drive = |time: f64| Boundary {
             tip_force: inputs.tip_force,
@@ -711,24 +718,27 @@ impl Unit {
         while time < step_size {
             let rest = step_size - time;
             let parts = (rest / next.max(shortest)).ceil().max(1.0);
-            let dt = rest / parts;
+            let mut dt = rest / parts;
             let attempt = self.attempt(&drive, time, dt, allowed * dt);
             let tried = match attempt {
                 Ok(Attempt { iterations, error, work }) => {
                     self.counts.iterations = self.counts.iterations.saturating_add(iterations as i32);
-                    next = dt * runge_kutta::stretch(error / (allowed * dt));
-                    // what the shortest step cannot follow it damps, and the outputs tell the error
-                    if error <= allowed * dt || dt <= shortest {
+                    let Stepper { mesh, rod, .. } = &self.stepper;
+                    let energy = self.energy.with(mesh, rod, self.stepper.attempted(), &gravity, &work);
+                    let gain = energy.total() - self.energy.total() + work.lost - work.base - work.tip;
+                    let fits = error <= allowed * dt;
+                    let grows = gain > GAIN * allowed * dt * (large + energy.kinetic + energy.elastic);
+                    next = dt * if fits && grows { LOST } else { runge_kutta::stretch(error / (allowed * dt)) };
+                    // what the shortest step cannot follow may be off, and the outputs tell by how much, but not grow
+                    let taken = (fits || dt <= shortest) && !grows;
+                    if taken {
                         self.stepper.accept();
-                        let Stepper { mesh, rod, state, .. } = &self.stepper;
-                        self.energy = self.energy.with(mesh, rod, state, &gravity, &work);
+                        self.energy = energy;
                         self.counts.steps = self.counts.steps.saturating_add(1);
                         (self.counts.order, self.counts.step) = (runge_kutta::ORDER, dt);
                         self.counts.error += error;
-                        true
-                    } else {
-                        false
                     }
+                    taken
                 }
                 Err(diverged) => {
                     self.counts.iterations = self.counts.iterations.saturating_add(diverged.iterations as i32);
@@ -741,10 +751,17 @@ impl Unit {
                 if dt > shortest {
                     continue;
                 }
-                self.internal_step(segment, inputs, Way::Damped, time, dt, 0)?;
                 next = shortest;
+                // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
+                while self.internal_step(segment, inputs, Way::Damped, time, dt, MAX_HALVINGS).is_err() {
+                    if dt == rest {
+                        self.internal_step(segment, inputs, Way::Damped, time, dt, 0)?;
+                        break;
+                    }
+                    dt = (2.0 * dt).min(rest);
+                }
             }
-            time = if parts == 1.0 { step_size } else { time + dt };
+            time = if dt == rest { step_size } else { time + dt };
         }
         self.pace = Some(Pace { next, ..pace });
         Ok(())
