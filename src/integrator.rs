@@ -24,8 +24,10 @@ use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
 
-/// Most steps chosen for an interval.
+/// Most steps chosen for an interval, in space.
 const MAX_CHOSEN_STEPS: f64 = 1000.0;
+/// The same in a plane, where they cost so little that a rod is followed however fast it moves.
+const MAX_PLANE_STEPS: f64 = 1e6;
 /// Length of the next step over one that Newton has lost.
 const LOST: f64 = 0.3;
 /// Halvings of a step before it is given up.
@@ -39,11 +41,13 @@ const CHANGE: (f64, f64) = (0.2, 4.0);
 /// space. A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
 const SPACE_SHARE: f64 = 0.2;
 /// The same in a plane.
-const PLANE_SHARE: f64 = 0.2;
+const PLANE_SHARE: f64 = 0.5;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
-/// The shortest step of order 4 over the step of generalized-α for the same tolerance.
+/// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
 const SHORTEST_STEP: f64 = 0.1;
+/// The same in a plane.
+const SHORTEST_PLANE_STEP: f64 = 1e-4;
 
 /// Steps in a plane after which the disturbance out of it is carried on, at the earliest: what buckles takes many more.
 const STEPS_UNWATCHED: u32 = 8;
@@ -57,6 +61,10 @@ const GROWN: f64 = 1e5;
 const FADED: f64 = 0.01;
 /// The size that the disturbance had at first, rad; about the roundings of a rod in space.
 const ROUNDINGS: f64 = 1e-12;
+
+/// Energy that a step may gain, relative, over the error it may have: those that follow the motion gain up to 10
+/// times that, those that pass the end of a rotation vector 1000 times and more.
+const GAIN: f64 = 30.0;
 
 /// How a rod is to be moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -225,6 +233,8 @@ pub struct Integrator {
     step: f64,
     /// Of the steps in space whose error chooses their length.
     pace: Pace,
+    /// What gravity and bending can give the rod, J.
+    large: f64,
     energy: Energy,
     effort: Effort,
     before: Before,
@@ -251,15 +261,15 @@ impl Integrator {
             Way::Accurate { tolerance, time, planar } => (tolerance, time, planar),
             Way::Equal | Way::Static => (0.0, 0.0, false),
         };
-        let pace = |share: f64| Pace {
+        let pace = |share: f64, shortest: f64| Pace {
             allowed: share * tolerance / time,
             next: time * FIRST_STEP,
-            shortest: SHORTEST_STEP * step,
+            shortest: shortest * step,
         };
         let planar = planar.then(|| {
             let plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
             let disturbance = Disturbance::new(stepper.mesh.points());
-            let (pace, unwatched) = (pace(PLANE_SHARE), (0.0, 0));
+            let (pace, unwatched) = (pace(PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
             Planar {
                 kept: plane.kept(),
                 before: (pace, disturbance.clone(), unwatched),
@@ -272,14 +282,17 @@ impl Integrator {
         });
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
         let effort = Effort::default();
+        let length = stepper.mesh.length();
+        let weight = stepper.rod.mass_per_length * length * boundary.gravity.norm();
         Ok(Self {
             in_plane: false,
             planar,
             way,
             scheme,
             step,
-            before: Before { in_plane: false, pace: pace(SPACE_SHARE), energy, effort },
-            pace: pace(SPACE_SHARE),
+            before: Before { in_plane: false, pace: pace(SPACE_SHARE, SHORTEST_STEP), energy, effort },
+            pace: pace(SPACE_SHARE, SHORTEST_STEP),
+            large: weight * length + stepper.rod.stiffness.max() / length,
             energy,
             effort,
             state_before: stepper.state.clone(),
@@ -348,8 +361,18 @@ impl Integrator {
     /// An interval in steps of order 4.
     fn follow(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
         self.choose(drive, duration);
-        let time = if self.in_plane { self.follow_in_plane(drive, duration) } else { 0.0 };
-        self.follow_in_space(drive, time, duration)
+        let planar = self.in_plane;
+        let time = if planar { self.follow_in_plane(drive, duration, true) } else { 0.0 };
+        let done = self.follow_in_space(drive, time, duration);
+        if done.is_err() && planar {
+            // better in a plane that it would leave than nowhere
+            self.restore();
+            self.choose(drive, duration);
+            if self.in_plane && self.follow_in_plane(drive, duration, false) == duration {
+                return Ok(());
+            }
+        }
+        done
     }
 
     /// Enters or leaves a plane, as all that acts in the interval makes it.
@@ -380,16 +403,16 @@ impl Integrator {
         }
     }
 
-    /// Follows in the plane as long as the steps need not be too short, and returns how far that was, s; beyond that the
-    /// rod is in space.
-    fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> f64 {
+    /// Follows in the plane as long as the steps need not be too short, and if it is `watched`, as long as the rod would stay
+    /// there; returns how far that was, s. Beyond that the rod is in space.
+    fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64, watched: bool) -> f64 {
         let Some(planar) = &mut self.planar else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
         if works {
             planar.plane.look(1.0, &begin);
         }
-        let shortest = planar.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
+        let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
         let mut time = 0.0;
         while time < duration {
             let (dt, last) = Pace { shortest, ..planar.pace }.step(duration - time);
@@ -408,7 +431,7 @@ impl Integrator {
             planar.plane.accept();
             self.effort.took(runge_kutta::ORDER, dt, error);
             self.effort.planar = true;
-            let due = planar.is_due(dt);
+            let due = watched && planar.is_due(dt);
             if works {
                 planar.plane.look(0.5, &at(0.5 * dt));
                 let middle = planar.plane.power();
@@ -436,19 +459,29 @@ impl Integrator {
     fn follow_in_space(&mut self, drive: &impl Fn(f64) -> Drive, mut time: f64, duration: f64) -> Result<(), Failed> {
         let shortest = self.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
         while time < duration {
-            let (dt, last) = Pace { shortest, ..self.pace }.step(duration - time);
+            let rest = duration - time;
+            let (mut dt, _) = Pace { shortest, ..self.pace }.step(rest);
             let tried = match self.attempt(drive, time, dt) {
                 Ok(Attempt { iterations, error, work }) => {
                     self.effort.iterated(iterations);
-                    // what the shortest step cannot follow it damps, and the estimate tells the error
-                    let good = self.pace.allows(dt, error) || dt <= shortest;
-                    if good {
+                    let Stepper { mesh, rod, .. } = &self.stepper;
+                    let attempted = self.stepper.attempted();
+                    let energy = self.energy.with(mesh, rod, attempted, &attempted.boundary.gravity, &work);
+                    let gain = energy.total() - self.energy.total() + work.lost - work.base - work.tip;
+                    let known = self.large + energy.kinetic + energy.elastic;
+                    let grows = gain > GAIN * self.pace.allowed * dt * known;
+                    let fits = self.pace.allows(dt, error);
+                    if fits && grows {
+                        self.pace.next = dt * LOST;
+                    }
+                    // what the shortest step cannot follow may be off, and the estimate tells by how much, but not grow
+                    let taken = (fits || dt <= shortest) && !grows;
+                    if taken {
                         self.stepper.accept();
-                        let Stepper { mesh, rod, state, .. } = &self.stepper;
-                        self.energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
+                        self.energy = energy;
                         self.effort.took(runge_kutta::ORDER, dt, error);
                     }
-                    good
+                    taken
                 }
                 Err(diverged) => {
                     self.effort.iterated(diverged.iterations);
@@ -461,10 +494,17 @@ impl Integrator {
                 if dt > shortest {
                     continue;
                 }
-                self.step(drive, Kind::Damped, time, dt, 0)?;
                 self.pace.next = shortest;
+                // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
+                while self.step(drive, Kind::Damped, time, dt, MAX_HALVINGS).is_err() {
+                    if dt == rest {
+                        self.step(drive, Kind::Damped, time, dt, 0)?;
+                        break;
+                    }
+                    dt = (2.0 * dt).min(rest);
+                }
             }
-            time = if last { duration } else { time + dt };
+            time = if dt == rest { duration } else { time + dt };
         }
         Ok(())
     }

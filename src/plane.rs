@@ -1021,20 +1021,10 @@ impl Plane {
     /// out refers to the instant last looked at. A fraction within the step holds to the order of the estimate, and
     /// until the next attempt.
     pub fn look(&mut self, fraction: f64, drive: &Drive) {
-        match self.mesh.rule.stages {
-            1 => self.look_by::<1>(fraction, drive),
-            2 => self.look_by::<2>(fraction, drive),
-            3 => self.look_by::<3>(fraction, drive),
-            _ => self.look_by::<4>(fraction, drive),
-        }
-    }
-
-    fn look_by<const K: usize>(&mut self, fraction: f64, drive: &Drive) {
-        let ends = self.ends_of(drive, &self.ends);
-        let count = self.cells.len();
         if fraction == 1.0 {
             self.look_points.copy_from_slice(&self.now);
         } else {
+            let count = self.cells.len();
             let weights = self.method.extension(fraction);
             for (j, points) in self.look_points.iter_mut().enumerate() {
                 *points = self.before[j];
@@ -1045,7 +1035,20 @@ impl Plane {
                 }
             }
         }
+        self.see(drive);
+    }
 
+    fn see(&mut self, drive: &Drive) {
+        match self.mesh.rule.stages {
+            1 => self.see_by::<1>(drive),
+            2 => self.see_by::<2>(drive),
+            3 => self.see_by::<3>(drive),
+            _ => self.see_by::<4>(drive),
+        }
+    }
+
+    fn see_by<const K: usize>(&mut self, drive: &Drive) {
+        let ends = self.ends_of(drive, &self.ends);
         let Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia } = self.section;
         let rule = &self.rule;
         let mut node = Node {

@@ -861,7 +861,7 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
     let mut u = boundary.base.velocity;
     for (i, section) in state.points.iter().enumerate() {
         let theta = so3::log(&old.points[i].rotation.tr_mul(&section.rotation));
-        let omega = time.motion(&old.memory[i].spin, &theta).velocity.value;
+        let omega = time.spin(&old.memory[i], &theta).velocity.value;
         let weight = mesh.cells[i / stages].length * mesh.rule.b[i % stages];
         u += section.rotation * omega.cross(&Vec3::z()) * weight;
     }

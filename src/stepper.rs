@@ -308,6 +308,11 @@ impl Stepper {
         Ok(Attempt { iterations, error, work })
     }
 
+    /// The end of the attempted step.
+    pub fn attempted(&self) -> &State {
+        &self.trial
+    }
+
     /// Makes the attempted step the present state.
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.state, &mut self.trial);

@@ -1,4 +1,5 @@
-//! The one-parameter family of the time scheme on x' = λx, where its order and its spectral radius are known.
+//! The one-parameter family of the time scheme on x' = λx, where its order and its spectral radius are known; and the
+//! Rosenbrock methods on what they integrate exactly.
 
 mod common;
 #[path = "common/scalar.rs"]
@@ -6,6 +7,7 @@ mod scalar;
 
 use common::Case;
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::rosenbrock::{RODAS4, RODAS5P, Rosenbrock};
 use nalgebra::Complex;
 use scalar::{amplification, rates, step};
 
@@ -56,4 +58,43 @@ fn the_family_has_its_weights_order_and_spectral_radius() {
     case.check("eigenvalues at z=0", &each(&near));
     let radius = |scheme: &Scheme| vec![far(scheme).iter().fold(0.0, |radius: f64, value| radius.max(value.abs()))];
     case.check("spectral radius at infinity", &each(&radius));
+}
+
+/// The end of one step of y' = tᵖ from 0 to 1.
+fn quadrature(method: &Rosenbrock, p: i32) -> f64 {
+    let mut increments = Vec::<f64>::new();
+    for i in 0..method.stages {
+        let rate = if p == 1 { method.rates[i] } else { 0.0 };
+        let before: f64 = method.c[i].iter().zip(&increments).map(|(c, u)| c * u).sum();
+        increments.push(method.gamma * (method.nodes[i].powi(p) + rate + before));
+    }
+    let [first @ .., last] = &increments[..] else { unreachable!("a method has stages") };
+    method.a[method.stages - 1].iter().zip(first).map(|(a, u)| a * u).sum::<f64>() + last
+}
+
+/// The end of one step of y' = zy from 1.
+fn growth(method: &Rosenbrock, z: f64) -> f64 {
+    let mut increments = Vec::<f64>::new();
+    let sum = |row: &[f64], increments: &[f64]| row.iter().zip(increments).map(|(a, u)| a * u).sum::<f64>();
+    for i in 0..method.stages {
+        let (y, before) = (1.0 + sum(method.a[i], &increments), sum(method.c[i], &increments));
+        increments.push((z * y + before) / (1.0 / method.gamma - z));
+    }
+    1.0 + sum(method.a[method.stages - 1], &increments) + increments[method.stages - 1]
+}
+
+#[test]
+fn the_coefficients_of_the_rosenbrock_methods_are_right_to_their_last_digits() {
+    for method in [&RODAS4, &RODAS5P] {
+        let order = method.order as i32;
+        for p in 0..order {
+            // coefficients of size 100, each rounded to 1e-16 of itself
+            let integral = quadrature(method, p) * f64::from(p + 1);
+            assert!((integral - 1.0).abs() < 1e-13, "order {order}, t^{p}: {integral}");
+        }
+        let miss = |z: f64| (growth(method, z) - z.exp()).abs() / z.abs().powi(order + 1);
+        assert!(miss(-0.1) < 0.01, "order {order}: {}", miss(-0.1));
+        // L-stable: nothing is left of what is infinitely fast
+        assert!(growth(method, -1e9).abs() < 1e-7, "order {order}: {}", growth(method, -1e9));
+    }
 }
