@@ -29,7 +29,7 @@ fn at_rest(rotation: Matrix3<f64>, gravity: f64) -> Boundary {
 }
 
 /// A smooth scene of a soft rod of 1 m.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scene {
     /// Hanging in equilibrium, its base moved sideways.
     Swing,
@@ -148,7 +148,12 @@ fn slope(sizes: &[f64], errors: &[f64]) -> f64 {
 }
 
 fn orders_in_time(scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
-    let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
+    orders_in_time_on((4, 4), scene, method, steps)
+}
+
+/// The same on other cells and stages.
+fn orders_in_time_on((cells, stages): (usize, usize), scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
+    let mesh = || Mesh::uniform(1.0, cells, stages, Vec3::zeros());
     let samples = steps[0] / 4;
     let reference = run(scene, method, steps[steps.len() - 1] * 8, mesh(), samples, 5e6);
     let errors: Vec<[f64; 4]> =
@@ -157,16 +162,18 @@ fn orders_in_time(scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
     std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
 }
 
-fn orders_in_space(scene: Scene, stages: usize, cells: &[usize]) -> [f64; 4] {
+/// Orders, and the errors of the finest mesh.
+fn orders_in_space(scene: Scene, stages: usize, cells: &[usize]) -> ([f64; 4], [f64; 4]) {
     let (method, steps, samples) = (Method::Alpha(Scheme::from_spectral_radius(0.5)), 120, 60);
     let mesh = |cells, stages| Mesh::uniform(1.0, cells, stages, Vec3::zeros());
-    let reference = run(scene, method, steps, mesh(24, 4), samples, 5e7);
+    let reference = run(scene, method, steps, mesh(30, 4), samples, 5e7);
     let errors: Vec<[f64; 4]> = cells
         .iter()
         .map(|&n| distance(&run(scene, method, steps, mesh(n, stages), samples, 5e7), &reference))
         .collect();
     let sizes: Vec<f64> = cells.iter().map(|&n| 1.0 / n as f64).collect();
-    std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
+    let orders = std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()));
+    (orders, errors[errors.len() - 1])
 }
 
 /// Names of the quantities of a record.
@@ -177,12 +184,15 @@ fn order_2s_in_space() {
     for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
         // fine enough for the layer (EI Δt²/ρA)^(1/4) = 4 cm that a step forms at the clamp, coarse enough to stay
         // above rounding
-        let meshes: [&[usize]; 3] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20]];
+        let finest: &[usize] = if scene == Scene::Spin { &[10, 12, 14, 16] } else { &[8, 9, 10, 12] };
+        let meshes: [&[usize]; 4] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20], finest];
         for (stages, cells) in (1..).zip(meshes) {
-            let orders = orders_in_space(scene, stages, cells);
-            for (order, quantity) in orders.iter().zip(QUANTITIES) {
+            let (orders, last) = orders_in_space(scene, stages, cells);
+            for ((order, error), quantity) in orders.iter().zip(last).zip(QUANTITIES) {
                 let expected = 2.0 * f64::from(stages as u32);
-                assert!((order - expected).abs() < 0.2, "{scene:?}, {stages} stages, {quantity}: order {order:.2}");
+                // the moment of the spin is down at its rounding, N m
+                let found = (order - expected).abs() < if stages == 4 { 0.3 } else { 0.2 } || error < 1e-11;
+                assert!(found, "{scene:?}, {stages} stages, {quantity}: order {order:.2}, {error:e}");
             }
         }
     }
@@ -205,12 +215,16 @@ fn second_order_in_time() {
 
 #[test]
 fn fourth_order_in_time_of_the_runge_kutta_steps() {
-    // the base of the swing begins and ends its way with a jump of its jerk, which leaves the order of the stages and one
-    // more
-    for (scene, least) in [(Scene::Pulse, 3.7), (Scene::Swing, 2.5)] {
-        let orders = orders_in_time(scene, Method::RungeKutta, &[120, 180, 240, 360]);
+    // on cells whose waves the steps do not follow, a base that moves leaves the order of the stages and one more
+    for (scene, mesh, least) in [
+        (Scene::Pulse, (4, 4), 3.7),
+        (Scene::Swing, (4, 4), 2.5),
+        (Scene::Swing, (2, 2), 3.95),
+        (Scene::Swing, (1, 4), 3.95),
+    ] {
+        let orders = orders_in_time_on(mesh, scene, Method::RungeKutta, &[120, 180, 240, 360]);
         for (order, quantity) in orders.iter().zip(QUANTITIES) {
-            assert!(*order > least, "{scene:?}, {quantity}: {order:.2}");
+            assert!(*order > least, "{scene:?} on {mesh:?}, {quantity}: {order:.2}");
         }
     }
 }
