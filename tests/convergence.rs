@@ -1,5 +1,6 @@
 //! Orders of convergence, fitted: in time 2 at every spectral radius below 1 and 4 of the Runge-Kutta steps, in space 2s;
-//! tip position, tip velocity and the reaction at the base, each against its own refined solution.
+//! tip position, tip velocity and the reaction at the base, each against its own refined solution. And in the compliance
+//! to shear and stretch, 1.
 
 mod common;
 
@@ -242,4 +243,50 @@ fn the_parameters_of_the_papers_examples_are_first_order_and_implicit_euler() {
     let difference = distance(&run(Scene::Pulse, Method::Alpha(printed), 240, mesh(), 60, 5e6), &euler);
     // Newton's tolerance of 1e-8 leaves 1e-13 and less after its last quadratic step; 240 steps of it
     assert!(difference.iter().all(|d| *d < 1e-10), "{difference:?}");
+}
+
+/// What a rod with the compliance of its section times `part` shows: in equilibrium under loads on its tip, then struck by
+/// the pulse.
+fn compliant(part: f64) -> [Record; 2] {
+    let soft = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+    let area = PI * 25e-6;
+    let section = Vec3::new(3.0, 3.0, 1.0) / (5e6 * area);
+    let rod = Rod { compliance: section * part, ..soft };
+    let mesh = Mesh::uniform(1.0, 4, 3, Vec3::zeros());
+    let still = at_rest(hanging(), GRAVITY);
+    let seen = |stepper: &Stepper| {
+        let (tip, base) = (stepper.state.tip(), &stepper.state.nodes[0]);
+        [tip.position, stepper.state.tip_memory().travel.velocity.value, base.force, base.moment]
+    };
+    let mut stepper = Stepper::new(mesh.clone(), rod, State::at_rest_shape(&mesh, &still.base));
+    let mut loaded = stepper.clone();
+    let loads = Boundary { tip_force: Vec3::new(0.2, 0.1, 0.0), tip_moment: Vec3::z() * 1e-3, ..still };
+    loaded.equilibrium(&loads).unwrap();
+    stepper.equilibrium(&still).unwrap();
+    let (steps, scheme) = (300, Scheme::from_spectral_radius(0.5));
+    let dt = DURATION / steps as f64;
+    let mut record = Record::new();
+    for i in 1..=steps {
+        // the same row for all: only the compliance differs
+        stepper.step(&Scene::Pulse.boundary(i as f64 * dt), scheme, dt, Row::Positions).unwrap();
+        record.push(seen(&stepper));
+    }
+    [vec![seen(&loaded)], record]
+}
+
+#[test]
+fn a_rod_of_vanishing_compliance_becomes_the_inextensible_one_linearly() {
+    let stiff = compliant(0.0);
+    let parts = [0.125, 0.0625, 0.03125, 0.015625];
+    let rods = parts.map(compliant);
+    for (what, which) in [("equilibrium", 0), ("pulse", 1)] {
+        let errors = rods.each_ref().map(|rod| distance(&rod[which], &stiff[which]));
+        for (q, quantity) in QUANTITIES.iter().enumerate() {
+            let errors = errors.map(|error| error[q]);
+            let order = slope(&parts, &errors);
+            // nothing moves in equilibrium, and the force on the base is what is on the rod
+            let same = what == "equilibrium" && errors[0] < 1e-15;
+            assert!(same || (order - 1.0).abs() < 0.1, "{what}, {quantity}: {order:.3}, {errors:?}");
+        }
+    }
 }
