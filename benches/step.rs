@@ -1,4 +1,4 @@
-//! Work and time of one Newton iteration, per cell: `cargo bench --bench step`.
+//! Work and time of one Newton iteration and of whole steps, per cell: `cargo bench --bench step`.
 //!
 //! Instructions are counted by callgrind, if it is installed: the program runs itself under it and takes the difference
 //! of two runs, so that what is counted is one iteration and nothing else. Times are medians. The rod is of rubber,
@@ -11,21 +11,32 @@
 mod banded;
 #[path = "../tests/common/full.rs"]
 mod full;
+#[path = "../tests/common/long.rs"]
+mod long;
+// the chart uses the rest of it
+#[allow(dead_code)]
+#[path = "../src/cli/chart/scenes.rs"]
+mod scenes;
 
 use banded::{Banded, flat};
 use cosserat_rod::alpha::Scheme;
-use cosserat_rod::boundary::{Boundary, Support};
+use cosserat_rod::boundary::{Boundary, Drive, Rates, Support};
 use cosserat_rod::fmi2::host::Fmu;
 use cosserat_rod::fmi2::variables::Kind;
 use cosserat_rod::mesh::{Gauss, Mesh};
 use cosserat_rod::package;
+use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::{Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
+use cosserat_rod::rosenbrock::RODAS4;
 use cosserat_rod::so3;
+use cosserat_rod::stepper::Stepper;
 use cosserat_rod::sweep::{Sweep, System};
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use full::Full;
+use long::{helix, inputs};
 use nalgebra::{Matrix3, SMatrix, Vector3};
+use scenes::Scene;
 use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
@@ -172,6 +183,122 @@ fn of_further_cell(stages: usize, part: &str, of: &str) -> Option<f64> {
     Some((instructions(many, stages, part, of)? - instructions(few, stages, part, of)?) / (many - few) as f64)
 }
 
+/// A rod that can take whole steps of order 4, each of the same work.
+enum Whole {
+    Space(Box<Stepper>, Boundary),
+    Plane(Box<Plane>, Boundary),
+}
+
+/// Length of a cell of [`Whole`], m: a rod of more cells is a longer one, in whose cells the same happens.
+const CELL: f64 = 0.1;
+/// Its steps, s, and the stages of its cells.
+const WHOLE_STEP: f64 = 1e-3;
+const WHOLE_STAGES: usize = 2;
+
+impl Whole {
+    /// Coils of rubber that turn with their base about an axis along which the rod is pulled: every cell is bent alike.
+    fn new(of: &str, cells: usize) -> Self {
+        let rod = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+        let length = CELL * cells as f64;
+        let spatial = of == "steps-in-space";
+        let kappa = if spatial { Vector3::new(2.0, 0.0, 1.0) } else { Vector3::y() * 2.0 };
+        let mesh = Mesh::uniform(length, cells, WHOLE_STAGES, kappa);
+        let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
+        let boundary = Boundary::hanging_from(base, Vector3::x() * 1e-3);
+        if spatial {
+            let state = State::at_rest_shape(&mesh, &base);
+            let mut stepper = Stepper::new(mesh, rod, state);
+            stepper.start(&boundary).expect("accelerations");
+            Self::Space(Box::new(stepper), boundary)
+        } else {
+            let drive = Drive { boundary, rates: Rates::default() };
+            let mut plane = Plane::new(&mesh, &rod, Vector3::y(), &base, &RODAS4).expect("a plane rod");
+            plane.start(&drive).expect("accelerations");
+            Self::Plane(Box::new(plane), boundary)
+        }
+    }
+
+    /// One step, and its Newton iterations.
+    fn step(&mut self) -> usize {
+        match self {
+            Self::Space(stepper, boundary) => {
+                let attempt = stepper.attempt(&|_| *boundary, WHOLE_STEP, 1e-4).expect("a step");
+                stepper.accept();
+                attempt.iterations
+            }
+            Self::Plane(plane, boundary) => {
+                let drive = Drive { boundary: *boundary, rates: Rates::default() };
+                plane.attempt(&|_| drive, WHOLE_STEP).expect("a step");
+                plane.accept();
+                0
+            }
+        }
+    }
+
+    /// Seconds of a step, the median of many.
+    fn seconds(&mut self, cells: usize) -> f64 {
+        let repetitions = (300 / cells).max(1);
+        let sample = |_| {
+            let start = Instant::now();
+            for _ in 0..repetitions {
+                black_box(self.step());
+            }
+            start.elapsed().as_secs_f64() / repetitions as f64
+        };
+        median((0..9).map(sample).collect())
+    }
+}
+
+/// Whole steps: instructions and time over the number of cells.
+fn whole_steps() {
+    for (of, what) in [("steps-in-space", "in space, order 4"), ("steps-in-a-plane", "in a plane, RODAS4")] {
+        println!("\nOne step {what}, {WHOLE_STAGES} Gauss points in a cell");
+        let names = ["instructions", "further cell", "ns per cell", "iterations"].map(|name| format!("{name:>14}"));
+        println!("{:>6}{}", "cells", names.concat());
+        let mut before: Option<(usize, f64)> = None;
+        for cells in CELLS {
+            let mut whole = Whole::new(of, cells);
+            let iterations = whole.step();
+            let time = whole.seconds(cells) / cells as f64;
+            let work = instructions(cells, WHOLE_STAGES, "step", of);
+            let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
+            before = work.map(|work| (cells, work));
+            let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.0}"));
+            let work = show(work.map(|work| work / cells as f64));
+            println!("{cells:>6}{work:>14}{:>14}{:>14.0}{iterations:>14}", show(further), time * 1e9);
+        }
+    }
+}
+
+/// A second of two long rods in the steps that the unit chooses: the umbilical in waves, a helix of 50 turns released.
+fn long_rods() -> Result<(), cosserat_rod::unit::Error> {
+    println!("\nA second of a long rod, left to the unit in communication steps of 20 ms, stages as in the line");
+    println!(
+        "{:>10} {:>6} {:>7} {:>6} {:>8} {:>10} {:>22}",
+        "rod", "cells", "stages", "steps", "retries", "s", "ns per cell and step"
+    );
+    let umbilical = |cells| (Parameters { cells, ..Scene::Umbilical.parameters() }, "umbilical");
+    let helix = |cells| (helix(cells), "helix");
+    for (parameters, name) in [10, 100, 1000].map(umbilical).into_iter().chain([150, 300, 600].map(helix)) {
+        let at = |time: f64| match name {
+            "umbilical" => inputs(&Scene::Umbilical.boundary(time)),
+            _ => Inputs::default(),
+        };
+        let mut unit = Unit::new(&parameters, &at(0.0), None)?;
+        let start = Instant::now();
+        for i in 0..50 {
+            unit.advance(&at(f64::from(i) * 0.02), 0.02)?;
+        }
+        let time = start.elapsed().as_secs_f64();
+        let outputs = unit.outputs();
+        let all = f64::from(outputs.steps + outputs.retries) * f64::from(outputs.cells);
+        let (cells, stages) = (parameters.cells, if parameters.stages == 0 { 4 } else { parameters.stages });
+        let (steps, retries) = (outputs.steps, outputs.retries);
+        println!("{name:>10} {cells:>6} {stages:>7} {steps:>6} {retries:>8} {time:>10.3} {:>22.0}", time * 1e9 / all);
+    }
+    Ok(())
+}
+
 /// Seconds of the sweep and of the banded LU, factors and solution, on the same system.
 fn sweep_and_lu(iteration: &mut Iteration, cells: usize) -> (f64, f64) {
     let sweep = iteration.seconds("factors", cells) + iteration.seconds("solution", cells);
@@ -251,6 +378,12 @@ fn main() {
         match arguments[at + 5].as_str() {
             "plane" => Linear::<2, 1>::new(cells, stages, false).count(part, times),
             "space" => Linear::<3, 3>::new(cells, stages, false).count(part, times),
+            "steps-in-space" | "steps-in-a-plane" => {
+                let mut whole = Whole::new(&arguments[at + 5], cells);
+                for _ in 0..times {
+                    black_box(whole.step());
+                }
+            }
             "extensible" => Linear::<3, 3>::new(cells, stages, true).count(part, times),
             _ => {
                 let mut iteration = Iteration::new(cells, stages);
@@ -289,6 +422,11 @@ fn main() {
             let per_cell = show(work.map(|work| work / cells as f64));
             println!("{cells:>6} {per_cell:>14} {:>14} {:>9.0}{shares}", show(further), total * 1e9);
         }
+    }
+
+    whole_steps();
+    if let Err(error) = long_rods() {
+        println!("\nThe long rods were lost: {error}");
     }
 
     println!("\nInstructions of a further cell");

@@ -1,5 +1,6 @@
 //! Orders of convergence, fitted: in time 2 at every spectral radius below 1 and 4 of the Runge-Kutta steps, in space 2s;
-//! tip position, tip velocity and the reaction at the base, each against its own refined solution.
+//! tip position, tip velocity and the reaction at the base, each against its own refined solution. And in the compliance
+//! to shear and stretch, 1.
 
 mod common;
 
@@ -29,7 +30,7 @@ fn at_rest(rotation: Matrix3<f64>, gravity: f64) -> Boundary {
 }
 
 /// A smooth scene of a soft rod of 1 m.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scene {
     /// Hanging in equilibrium, its base moved sideways.
     Swing,
@@ -148,7 +149,12 @@ fn slope(sizes: &[f64], errors: &[f64]) -> f64 {
 }
 
 fn orders_in_time(scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
-    let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
+    orders_in_time_on((4, 4), scene, method, steps)
+}
+
+/// The same on other cells and stages.
+fn orders_in_time_on((cells, stages): (usize, usize), scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
+    let mesh = || Mesh::uniform(1.0, cells, stages, Vec3::zeros());
     let samples = steps[0] / 4;
     let reference = run(scene, method, steps[steps.len() - 1] * 8, mesh(), samples, 5e6);
     let errors: Vec<[f64; 4]> =
@@ -157,16 +163,18 @@ fn orders_in_time(scene: Scene, method: Method, steps: &[usize]) -> [f64; 4] {
     std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
 }
 
-fn orders_in_space(scene: Scene, stages: usize, cells: &[usize]) -> [f64; 4] {
+/// Orders, and the errors of the finest mesh.
+fn orders_in_space(scene: Scene, stages: usize, cells: &[usize]) -> ([f64; 4], [f64; 4]) {
     let (method, steps, samples) = (Method::Alpha(Scheme::from_spectral_radius(0.5)), 120, 60);
     let mesh = |cells, stages| Mesh::uniform(1.0, cells, stages, Vec3::zeros());
-    let reference = run(scene, method, steps, mesh(24, 4), samples, 5e7);
+    let reference = run(scene, method, steps, mesh(30, 4), samples, 5e7);
     let errors: Vec<[f64; 4]> = cells
         .iter()
         .map(|&n| distance(&run(scene, method, steps, mesh(n, stages), samples, 5e7), &reference))
         .collect();
     let sizes: Vec<f64> = cells.iter().map(|&n| 1.0 / n as f64).collect();
-    std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()))
+    let orders = std::array::from_fn(|q| slope(&sizes, &errors.iter().map(|e| e[q]).collect::<Vec<_>>()));
+    (orders, errors[errors.len() - 1])
 }
 
 /// Names of the quantities of a record.
@@ -177,12 +185,15 @@ fn order_2s_in_space() {
     for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
         // fine enough for the layer (EI Δt²/ρA)^(1/4) = 4 cm that a step forms at the clamp, coarse enough to stay
         // above rounding
-        let meshes: [&[usize]; 3] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20]];
+        let finest: &[usize] = if scene == Scene::Spin { &[10, 12, 14, 16] } else { &[8, 9, 10, 12] };
+        let meshes: [&[usize]; 4] = [&[30, 40, 60, 80], &[16, 20, 24, 32], &[12, 14, 16, 20], finest];
         for (stages, cells) in (1..).zip(meshes) {
-            let orders = orders_in_space(scene, stages, cells);
-            for (order, quantity) in orders.iter().zip(QUANTITIES) {
+            let (orders, last) = orders_in_space(scene, stages, cells);
+            for ((order, error), quantity) in orders.iter().zip(last).zip(QUANTITIES) {
                 let expected = 2.0 * f64::from(stages as u32);
-                assert!((order - expected).abs() < 0.2, "{scene:?}, {stages} stages, {quantity}: order {order:.2}");
+                // the moment of the spin is down at its rounding, N m
+                let found = (order - expected).abs() < if stages == 4 { 0.3 } else { 0.2 } || error < 1e-11;
+                assert!(found, "{scene:?}, {stages} stages, {quantity}: order {order:.2}, {error:e}");
             }
         }
     }
@@ -205,12 +216,16 @@ fn second_order_in_time() {
 
 #[test]
 fn fourth_order_in_time_of_the_runge_kutta_steps() {
-    // the base of the swing begins and ends its way with a jump of its jerk, which leaves the order of the stages and one
-    // more
-    for (scene, least) in [(Scene::Pulse, 3.7), (Scene::Swing, 2.5)] {
-        let orders = orders_in_time(scene, Method::RungeKutta, &[120, 180, 240, 360]);
+    // on cells whose waves the steps do not follow, a base that moves leaves the order of the stages and one more
+    for (scene, mesh, least) in [
+        (Scene::Pulse, (4, 4), 3.7),
+        (Scene::Swing, (4, 4), 2.5),
+        (Scene::Swing, (2, 2), 3.95),
+        (Scene::Swing, (1, 4), 3.95),
+    ] {
+        let orders = orders_in_time_on(mesh, scene, Method::RungeKutta, &[120, 180, 240, 360]);
         for (order, quantity) in orders.iter().zip(QUANTITIES) {
-            assert!(*order > least, "{scene:?}, {quantity}: {order:.2}");
+            assert!(*order > least, "{scene:?} on {mesh:?}, {quantity}: {order:.2}");
         }
     }
 }
@@ -228,4 +243,50 @@ fn the_parameters_of_the_papers_examples_are_first_order_and_implicit_euler() {
     let difference = distance(&run(Scene::Pulse, Method::Alpha(printed), 240, mesh(), 60, 5e6), &euler);
     // Newton's tolerance of 1e-8 leaves 1e-13 and less after its last quadratic step; 240 steps of it
     assert!(difference.iter().all(|d| *d < 1e-10), "{difference:?}");
+}
+
+/// What a rod with the compliance of its section times `part` shows: in equilibrium under loads on its tip, then struck by
+/// the pulse.
+fn compliant(part: f64) -> [Record; 2] {
+    let soft = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
+    let area = PI * 25e-6;
+    let section = Vec3::new(3.0, 3.0, 1.0) / (5e6 * area);
+    let rod = Rod { compliance: section * part, ..soft };
+    let mesh = Mesh::uniform(1.0, 4, 3, Vec3::zeros());
+    let still = at_rest(hanging(), GRAVITY);
+    let seen = |stepper: &Stepper| {
+        let (tip, base) = (stepper.state.tip(), &stepper.state.nodes[0]);
+        [tip.position, stepper.state.tip_memory().travel.velocity.value, base.force, base.moment]
+    };
+    let mut stepper = Stepper::new(mesh.clone(), rod, State::at_rest_shape(&mesh, &still.base));
+    let mut loaded = stepper.clone();
+    let loads = Boundary { tip_force: Vec3::new(0.2, 0.1, 0.0), tip_moment: Vec3::z() * 1e-3, ..still };
+    loaded.equilibrium(&loads).unwrap();
+    stepper.equilibrium(&still).unwrap();
+    let (steps, scheme) = (300, Scheme::from_spectral_radius(0.5));
+    let dt = DURATION / steps as f64;
+    let mut record = Record::new();
+    for i in 1..=steps {
+        // the same row for all: only the compliance differs
+        stepper.step(&Scene::Pulse.boundary(i as f64 * dt), scheme, dt, Row::Positions).unwrap();
+        record.push(seen(&stepper));
+    }
+    [vec![seen(&loaded)], record]
+}
+
+#[test]
+fn a_rod_of_vanishing_compliance_becomes_the_inextensible_one_linearly() {
+    let stiff = compliant(0.0);
+    let parts = [0.125, 0.0625, 0.03125, 0.015625];
+    let rods = parts.map(compliant);
+    for (what, which) in [("equilibrium", 0), ("pulse", 1)] {
+        let errors = rods.each_ref().map(|rod| distance(&rod[which], &stiff[which]));
+        for (q, quantity) in QUANTITIES.iter().enumerate() {
+            let errors = errors.map(|error| error[q]);
+            let order = slope(&parts, &errors);
+            // nothing moves in equilibrium, and the force on the base is what is on the rod
+            let same = what == "equilibrium" && errors[0] < 1e-15;
+            assert!(same || (order - 1.0).abs() < 0.1, "{what}, {quantity}: {order:.3}, {errors:?}");
+        }
+    }
 }

@@ -1,7 +1,16 @@
 //! The unit between communication points: what the host samples becomes one smooth motion of the base.
 
+#[path = "common/long.rs"]
+mod long;
+// the chart uses the rest of it
+#[allow(dead_code)]
+#[path = "../src/cli/chart/scenes.rs"]
+mod scenes;
+
 use cosserat_rod::unit::{Error, Inputs, Outputs, Parameters, Unit};
+use long::{helix, inputs};
 use nalgebra::{Vector3, Vector4};
+use scenes::Scene;
 use std::f64::consts::TAU;
 
 type Vec3 = Vector3<f64>;
@@ -238,4 +247,21 @@ fn a_short_stiff_rod_does_not_take_its_time() {
     let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
     unit.advance(&Inputs::default(), 0.01).unwrap();
     assert!(unit.outputs().solver.steps <= 1000, "{}", unit.outputs().solver.steps);
+}
+
+#[test]
+fn long_rods_go_through_a_second() {
+    let umbilical = |cells| ("umbilical", Parameters { cells, ..Scene::Umbilical.parameters() });
+    let helix = |cells| ("helix", helix(cells));
+    for (name, parameters) in [umbilical(10), umbilical(40), helix(150)] {
+        let at = |t: f64| if name == "umbilical" { inputs(&Scene::Umbilical.boundary(t)) } else { Inputs::default() };
+        let mut unit = Unit::new(&parameters, &at(0.0), None).unwrap();
+        for i in 0..50 {
+            let done = unit.advance(&at(f64::from(i) * 0.02), 0.02);
+            done.unwrap_or_else(|error| panic!("{name}, {} cells, step {i}: {error}", parameters.cells));
+        }
+        let outputs = unit.outputs();
+        assert!(outputs.steps < 1000, "{name}, {} cells: {} steps", parameters.cells, outputs.steps);
+        assert!((outputs.tip_position - at(1.0).base_position).norm() <= parameters.length);
+    }
 }

@@ -7,6 +7,7 @@
 //! | rate, mended | the same with its mendings (see `cosserat_rod::rate`) |
 //! | pose, a from rotations / positions | the pose formulation with either of its acceleration rows, whatever comes |
 //! | pose, the unit's way | the same, each step by the row and scheme that suit it |
+//! | the unit by itself | steps of order 4 as its tolerance allows, in communication steps of that size for a second |
 //! | shooting | the boundary value problem of the mended steps, from the base to the tip |
 //! | explicit | springs and a leap over velocities |
 //!
@@ -16,6 +17,7 @@ pub mod explicit;
 mod map;
 mod scan;
 mod shooting;
+mod unit;
 
 use crate::report::{Example, Numbers};
 use crate::scene::{self, ByRow, PAPER};
@@ -31,6 +33,7 @@ use shooting::Shooting;
 use std::error::Error;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use unit::Automatic;
 
 /// Time steps, s.
 const TIME_STEPS: [f64; 12] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1.0 / 30.0, 0.1, 1.0, 10.0, 100.0];
@@ -48,6 +51,9 @@ const SCHEMES: [(&str, Scheme); 7] = [
     ("(0, 0.25, 0.5)", Scheme { alpha: 0.0, beta: 0.25, gamma: 0.5 }),
 ];
 
+/// Tolerances of the unit by itself.
+const TOLERANCES: [(&str, f64); 4] = [("1e-2", 1e-2), ("1e-3", 1e-3), ("1e-4", 1e-4), ("1e-5", 1e-5)];
+
 type Lost = Box<dyn Error + Send + Sync>;
 
 /// How the rod is moved.
@@ -58,17 +64,19 @@ enum Method {
     PoseByRotations,
     PoseByPositions,
     Pose,
+    Unit,
     Shooting,
     Explicit,
 }
 
 impl Method {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::RatePrinted,
         Self::RateMended,
         Self::PoseByRotations,
         Self::PoseByPositions,
         Self::Pose,
+        Self::Unit,
         Self::Shooting,
         Self::Explicit,
     ];
@@ -80,16 +88,31 @@ impl Method {
             Self::PoseByRotations => "pose, a from rotations",
             Self::PoseByPositions => "pose, a from positions",
             Self::Pose => "pose, the unit's way",
+            Self::Unit => "the unit by itself, tolerance 1e-2 to 1e-5",
             Self::Shooting => "shooting, of rate, mended",
             Self::Explicit => "explicit, with springs",
         }
     }
 
-    /// Indices of the schemes it is run with.
+    /// Indices of the schemes, or tolerances, it is run with.
     fn schemes(&self) -> std::ops::Range<usize> {
         match self {
             Self::Explicit => 0..1,
+            Self::Unit => 0..TOLERANCES.len(),
             _ => 0..SCHEMES.len(),
+        }
+    }
+
+    /// Name of one of them.
+    fn scheme(&self, index: usize) -> &'static str {
+        if *self == Self::Unit { TOLERANCES[index].0 } else { SCHEMES[index].0 }
+    }
+
+    /// Steps of a run.
+    fn steps(&self, dt: f64) -> usize {
+        match self {
+            Self::Unit => scan::STEPS.min((1.0 / dt).ceil() as usize),
+            _ => scan::STEPS,
         }
     }
 
@@ -110,6 +133,7 @@ impl Method {
             Self::PoseByRotations => Box::new(ByRow { stepper: by_poses()?, row: Row::Rotations }),
             Self::PoseByPositions => Box::new(ByRow { stepper: by_poses()?, row: Row::Positions }),
             Self::Pose => Box::new(by_poses()?),
+            Self::Unit => Box::new(Automatic::new(material, CELLS[case.cells], TOLERANCES[case.scheme].1)?),
             Self::Shooting => Box::new(Shooting::new(by_rates(Options::MENDED)?)),
             Self::Explicit => Box::new(Explicit::new(&mesh, &scene::compliant(&material.rod()), &boundary)),
         })
@@ -145,14 +169,16 @@ impl Case {
         let mut rod = self.method.begin(self)?;
         let reference = &references[self.material];
         let (_, scheme) = SCHEMES[self.scheme];
-        Ok(scan::run(&MATERIALS[self.material], reference, rod.as_mut(), scheme, TIME_STEPS[self.step]))
+        let dt = TIME_STEPS[self.step];
+        let steps = self.method.steps(dt);
+        Ok(scan::run(&MATERIALS[self.material], reference, rod.as_mut(), scheme, dt, steps))
     }
 
     fn record(&self, outcome: &Outcome) -> Vec<String> {
         let number = |x: f64| format!("{x:.3e}");
         vec![
             self.method.name().to_owned(),
-            SCHEMES[self.scheme].0.to_owned(),
+            self.method.scheme(self.scheme).to_owned(),
             MATERIALS[self.material].name.to_owned(),
             CELLS[self.cells].to_string(),
             number(TIME_STEPS[self.step]),
@@ -210,7 +236,7 @@ pub fn run(bar: &ProgressBar) -> Result<Example, Box<dyn Error>> {
 
     let head = [
         "method",
-        "scheme",
+        "scheme or tolerance",
         "material",
         "cells",
         "time step, s",
@@ -245,7 +271,13 @@ fn counts(runs: &[(Case, Outcome)]) -> Vec<String> {
             };
             let words: Vec<String> =
                 Verdict::ALL.iter().map(|verdict| format!("{} {}", of(Some(*verdict)), verdict.name())).collect();
-            lines.push(format!("{}, {}: of {} runs {}", method.name(), SCHEMES[scheme].0, of(None), words.join(", ")));
+            lines.push(format!(
+                "{}, {}: of {} runs {}",
+                method.name(),
+                method.scheme(scheme),
+                of(None),
+                words.join(", ")
+            ));
         }
     }
     lines

@@ -7,9 +7,10 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::State;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::stepper::Stepper;
+use cosserat_rod::unit::Parameters;
 use nalgebra::Vector3;
 
-/// Steps of a run.
+/// Steps of a run, most.
 pub const STEPS: usize = 200;
 /// The motion is compared up to here, s: a quarter swing and more, before anything is chaotic.
 const COMPARED: f64 = 0.3;
@@ -49,6 +50,23 @@ pub const MATERIALS: [Material; 3] = [
 impl Material {
     pub fn rod(&self) -> Rod {
         Rod::circular(self.radius, self.moduli.0, self.moduli.1, self.density)
+    }
+
+    /// The same for the unit, not damped, on cells of one stage.
+    pub fn parameters(&self, cells: usize) -> Parameters {
+        let Self { length, radius, density, moduli: (youngs_modulus, shear_modulus), .. } = *self;
+        Parameters {
+            length,
+            radius,
+            density,
+            youngs_modulus,
+            shear_modulus,
+            damping_bending: 0.0,
+            damping_twist: 0.0,
+            cells: cells as i32,
+            stages: 1,
+            ..Parameters::default()
+        }
     }
 
     pub fn mesh(&self, cells: usize) -> Mesh {
@@ -140,8 +158,15 @@ pub struct Outcome {
     pub error: f64,
 }
 
-/// Runs a rod.
-pub fn run(material: &Material, reference: &Reference, rod: &mut dyn Formulation, scheme: Scheme, dt: f64) -> Outcome {
+/// Runs a rod for `count` steps.
+pub fn run(
+    material: &Material,
+    reference: &Reference,
+    rod: &mut dyn Formulation,
+    scheme: Scheme,
+    dt: f64,
+    count: usize,
+) -> Outcome {
     let boundary = scene::horizontal();
     let (length, weight) = (material.length, material.weight());
     let h = length / (rod.nodes() - 1) as f64;
@@ -149,8 +174,8 @@ pub fn run(material: &Material, reference: &Reference, rod: &mut dyn Formulation
     let (mut steps, mut iterations) = (0, 0);
     let (mut growth, mut drift) = (0.0f64, 0.0f64);
     let (mut squares, mut compared) = (0.0, 0);
-    let mut reactions: Vec<f64> = Vec::with_capacity(STEPS);
-    while steps < STEPS {
+    let mut reactions: Vec<f64> = Vec::with_capacity(count);
+    while steps < count {
         let Ok(report) = rod.step(&boundary, scheme, dt) else { break };
         steps += 1;
         iterations += report.iterations;
@@ -180,7 +205,7 @@ pub fn run(material: &Material, reference: &Reference, rod: &mut dyn Formulation
         (rod.tip().position - reference.hanging).norm() / length
     };
     let ringing = alternation(&reactions[reactions.len().saturating_sub(10)..]);
-    let verdict = if steps < STEPS || !growth.is_finite() {
+    let verdict = if steps < count || !growth.is_finite() {
         Verdict::Lost
     } else if growth > GROWTH {
         Verdict::Growing
@@ -265,7 +290,7 @@ mod tests {
     fn outcome(mut made: Made) -> Outcome {
         let material = &MATERIALS[1];
         let reference = Reference { tips: Vec::new(), hanging: -Vector3::z() * material.length };
-        run(material, &reference, &mut made, Scheme::BACKWARD_EULER, 1.0)
+        run(material, &reference, &mut made, Scheme::BACKWARD_EULER, 1.0, STEPS)
     }
 
     #[test]

@@ -1,0 +1,48 @@
+//! The unit as a host gets it: a communication step is one step of the map, however many it takes inside.
+
+use super::scan::Material;
+use cosserat_rod::alpha::Scheme;
+use cosserat_rod::boundary::Boundary;
+use cosserat_rod::energy::Energy;
+use cosserat_rod::formulation::Formulation;
+use cosserat_rod::pose::Section;
+use cosserat_rod::stepper::{Diverged, Reason, Report, Termination};
+use cosserat_rod::unit::{Error, Inputs, Unit};
+use nalgebra::Vector3;
+
+/// A rod released from the horizontal, in the steps that the unit chooses.
+pub struct Automatic {
+    unit: Unit,
+    iterations: i32,
+}
+
+impl Automatic {
+    pub fn new(material: &Material, cells: usize, tolerance: f64) -> Result<Self, Error> {
+        let unit = Unit::new(&material.parameters(cells), &Inputs::default(), Some(tolerance))?;
+        Ok(Self { unit, iterations: 0 })
+    }
+}
+
+impl Formulation for Automatic {
+    fn step(&mut self, _: &Boundary, _: Scheme, dt: f64) -> Result<Report, Diverged> {
+        self.unit.advance(&Inputs::default(), dt).map_err(|error| match error {
+            Error::Diverged { cause, .. } => cause,
+            _ => Diverged { iterations: 0, residual: f64::INFINITY, reason: Reason::NotFinite },
+        })?;
+        let before = std::mem::replace(&mut self.iterations, self.unit.outputs().iterations);
+        let iterations = (self.iterations - before) as usize;
+        Ok(Report { iterations, residual: 0.0, termination: Termination::Newton })
+    }
+
+    fn nodes(&self) -> usize {
+        self.unit.stepper().nodes()
+    }
+
+    fn section(&self, j: usize) -> Section {
+        self.unit.stepper().section(j)
+    }
+
+    fn energy(&self, _: &Vector3<f64>) -> Energy {
+        self.unit.outputs().energy
+    }
+}
