@@ -70,6 +70,17 @@ pub fn error_weight(j: usize) -> f64 {
     weight(j) - EMBEDDED[j]
 }
 
+/// Weights of the stages before stage `i` in what goes on smoothly from them: the parabola through the last three, or as
+/// many as there are, at cᵢ.
+pub fn onward(i: usize) -> [f64; STAGES] {
+    let mut weights = [0.0; STAGES];
+    let last = i.saturating_sub(3)..i;
+    for j in last.clone() {
+        weights[j] = last.clone().filter(|k| *k != j).map(|k| (C[i] - C[k]) / (C[j] - C[k])).product();
+    }
+    weights
+}
+
 /// Part of the step that the estimate would allow which is taken, so that few are refused.
 const SAFETY: f64 = 0.9;
 /// Bounds of the change from one step to the next.
@@ -122,6 +133,17 @@ mod tests {
         for i in 1..STAGES {
             // stages of order 2
             assert!((times(&one)[i] - C[i]).abs() < 1e-14 && (ac[i] - 0.5 * c2[i]).abs() < 1e-14, "stage {i}");
+        }
+    }
+
+    #[test]
+    fn what_is_smooth_goes_on() {
+        for i in 1..STAGES {
+            let weights = onward(i);
+            for degree in 0..i.min(3) as i32 {
+                let sum: f64 = (0..STAGES).map(|j| weights[j] * C[j].powi(degree)).sum();
+                assert!((sum - C[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+            }
         }
     }
 

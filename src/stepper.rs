@@ -10,7 +10,7 @@ use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
 use crate::energy::Powers;
 use crate::mesh::Mesh;
-use crate::pose::{self, Known, Row, State, Time};
+use crate::pose::{self, Known, Row, Section, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta;
 use crate::so3;
@@ -30,6 +30,15 @@ const MAX_ROTATION: f64 = 0.7;
 const TOLERANCE: f64 = 1e-8;
 /// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
 const ROUNDINGS: f64 = 256.0;
+
+/// Part of what a stage need not resolve that its iteration may leave: the errors of many steps point one way and add up.
+const PART_LEFT: f64 = 1e-2;
+/// Part of an increment of Newton's own that it leaves at most: what the Jacobian leaves out, or its square.
+const NEWTON_LEAVES: f64 = 1e-2;
+/// Iterations in which kept factors must be seen to lead there: beyond them new ones cost less.
+const SOON: i32 = 4;
+/// Part of the increment before that one with kept factors may have and still be taken.
+const WORST_RATE: f64 = 0.7;
 
 /// Turn of a section in a step up to which the step resolves the motion, rad: well below the angles (about 1 rad) where
 /// Newton on the accelerations of the rotations begins to fail and energy to grow.
@@ -127,6 +136,25 @@ struct Rates {
     kappa_t: Vector3<f64>,
 }
 
+/// n, m and a of a section, which follow from the motion and have no history.
+#[derive(Clone, Copy, Debug, Default)]
+struct Carried {
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+    acceleration: Vector3<f64>,
+}
+
+/// The factors that one stage of a step of order 4 leaves to the next.
+#[derive(Clone, Copy, PartialEq)]
+enum Factors {
+    /// There are none of this step.
+    Missing,
+    /// They serve.
+    Good,
+    /// The rod turns too much from stage to stage.
+    Poor,
+}
+
 /// The largest increments of an iteration.
 struct Largest {
     turn: f64,
@@ -157,10 +185,14 @@ pub struct Stepper {
     pub state: State,
     old: State,
     trial: State,
+    /// The sections that a stage begins with.
+    guess: State,
     system: System,
     sweep: Sweep,
     /// The rates at the stages of a step of order 4, of everything that has a history.
     stages: Vec<[Rates; runge_kutta::STAGES]>,
+    /// What the sections carry there, of the nodes and then of the points.
+    carried: Vec<[Carried; runge_kutta::STAGES]>,
 }
 
 impl Stepper {
@@ -170,7 +202,19 @@ impl Stepper {
         let system = System::new(mesh.cells.len(), &mesh.rule, extensible);
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
         let stages = vec![Default::default(); state.memory.len()];
-        Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep, stages }
+        let carried = vec![Default::default(); state.nodes.len() + state.points.len()];
+        Self {
+            old: state.clone(),
+            trial: state.clone(),
+            guess: state.clone(),
+            state,
+            mesh,
+            rod,
+            system,
+            sweep,
+            stages,
+            carried,
+        }
     }
 
     /// The state before the last step.
@@ -272,11 +316,12 @@ impl Stepper {
         self.take_rates(0, weight);
         let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * runge_kutta::weight(0));
         let mut iterations = 0;
+        let mut factors = Factors::Missing;
         for i in 1..runge_kutta::STAGES {
             let boundary = drive(runge_kutta::C[i] * h);
             self.prepare_stage(i, h, weight, &boundary);
             iterations += self
-                .stage(&boundary, &time, accuracy)
+                .stage(&boundary, &time, accuracy, &mut factors)
                 .map_err(|diverged| Diverged { iterations: iterations + diverged.iterations, ..diverged })?;
             self.trial.settle(&self.mesh, &self.rod, &self.old, &boundary, &time);
             self.take_rates(i, weight);
@@ -296,11 +341,8 @@ impl Stepper {
 
     /// What the stages before stage `i` give of its coordinates, and a guess of it.
     fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary) {
-        let Self { mesh, old, trial, stages, .. } = self;
-        // θ_tt goes on as between the two stages before
-        let c = &runge_kutta::C;
-        let last = i - 1;
-        let (before, on) = if i > 1 { (i - 2, (c[i] - c[last]) / (c[last] - c[i - 2])) } else { (0, 0.0) };
+        let Self { mesh, old, trial, stages, carried, .. } = self;
+        let on = runge_kutta::onward(i);
         for (m, rates) in stages.iter().enumerate() {
             let memory = &mut old.memory[m];
             let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
@@ -311,42 +353,102 @@ impl Stepper {
                 known.kappa += kappa_t * a;
             }
             memory.known = known;
-            let theta_tt = rates[last].theta_tt + (rates[last].theta_tt - rates[before].theta_tt) * on;
+            let theta_tt = (0..i).fold(Vector3::zeros(), |sum, j| sum + rates[j].theta_tt * on[j]);
             let theta = known.theta + (known.rate + theta_tt / weight) / weight;
             if let (Some(point), Some(begin)) = (trial.points.get_mut(m), old.points.get(m)) {
                 point.rotation = begin.rotation * so3::exp(&theta);
             }
         }
         trial.carry_nodes(mesh, &boundary.base.rotation);
+        for (section, carried) in trial.nodes.iter_mut().chain(&mut trial.points).zip(carried) {
+            let goes_on = |field: fn(&Carried) -> Vector3<f64>| {
+                (0..i).fold(Vector3::zeros(), |sum, j| sum + field(&carried[j]) * on[j])
+            };
+            section.force = goes_on(|carried| carried.force);
+            section.moment = goes_on(|carried| carried.moment);
+            section.acceleration = goes_on(|carried| carried.acceleration);
+        }
     }
 
     /// Newton from the guess in `trial` to the stage, in `trial`.
-    fn stage(&mut self, boundary: &Boundary, time: &Time, accuracy: f64) -> Result<usize, Diverged> {
-        let Self { mesh, rod, system, sweep, old, trial, .. } = self;
+    ///
+    /// Factors are kept as long as they soon lead there: increments that fall by the rate q leave an error of q/(1 − q)
+    /// times the last. One that hardly falls is not taken; where the factors were another stage's, Newton then begins
+    /// anew from the guess.
+    fn stage(
+        &mut self,
+        boundary: &Boundary,
+        time: &Time,
+        accuracy: f64,
+        factors: &mut Factors,
+    ) -> Result<usize, Diverged> {
+        let Self { mesh, rod, system, sweep, old, trial, guess, .. } = self;
         let (scales, rounding) = scales(mesh, rod, old, boundary, time);
-        // an increment leaves an error of at most its tenth: what the Jacobian leaves out, or its square
-        let tolerance = (10.0 * accuracy).clamp(TOLERANCE, 1e-2);
-        let mut residual = f64::INFINITY;
-        for iteration in 1..=MAX_STAGE_ITERATIONS {
-            let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
-            pose::assemble(mesh, rod, old, trial, boundary, time, system);
-            residual = system.residuals.largest(&scales);
-            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
-            let largest = Largest::of(sweep);
-            if !(residual + largest.turn + largest.force + largest.moment).is_finite() {
-                return Err(diverged(residual, Reason::NotFinite));
-            }
-            trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / largest.turn).min(1.0), time.row());
-            if largest.turn < tolerance && largest.force < (tolerance * scales.force).max(ROUNDINGS * rounding) {
-                return Ok(iteration);
-            }
+        let target = (accuracy * PART_LEFT).clamp(TOLERANCE * 1e-3, 1e-5);
+        let mut keep = *factors == Factors::Good;
+        let mut borrowed = keep;
+        if borrowed {
+            guess.copy_sections_from(trial);
         }
-        Err(Diverged { iterations: MAX_STAGE_ITERATIONS, residual, reason: Reason::TooManyIterations })
+        let mut before = f64::INFINITY;
+        let (mut iterations, mut factorised) = (0, 0);
+        loop {
+            iterations += 1;
+            let diverged = |system: &System, reason| {
+                Err(Diverged { iterations, residual: system.residuals.largest(&scales), reason })
+            };
+            if keep {
+                pose::assemble_residuals(mesh, rod, old, trial, boundary, time, system);
+                sweep.solve_for(&system.residuals);
+            } else {
+                factorised += 1;
+                pose::assemble(mesh, rod, old, trial, boundary, time, system);
+                if let Err(singular) = sweep.solve(system) {
+                    return diverged(system, Reason::Singular(singular));
+                }
+            }
+            let Largest { turn, force, moment } = Largest::of(sweep);
+            let size = larger(turn, if force < ROUNDINGS * rounding { 0.0 } else { force / scales.force });
+            // 0 where there was none before
+            let rate = size / before;
+            if keep && !(rate < WORST_RATE && (size + moment).is_finite()) {
+                keep = false;
+                if borrowed {
+                    (borrowed, *factors, before) = (false, Factors::Poor, f64::INFINITY);
+                    trial.copy_sections_from(guess);
+                }
+                continue;
+            }
+            if !(size + force + moment).is_finite() {
+                return diverged(system, Reason::NotFinite);
+            }
+            trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / turn).min(1.0), time.row());
+            let left = rate / (1.0 - rate) * size;
+            let seen = keep && before.is_finite();
+            if if seen { left <= target } else { !keep && size * NEWTON_LEAVES <= target } {
+                if *factors == Factors::Missing {
+                    *factors = Factors::Good;
+                }
+                return Ok(iterations);
+            }
+            if factorised == MAX_STAGE_ITERATIONS {
+                return diverged(system, Reason::TooManyIterations);
+            }
+            let soon = !seen || left * rate.powi(SOON) <= target;
+            if borrowed && !soon {
+                *factors = Factors::Poor;
+            }
+            (keep, before) = (soon, size);
+        }
     }
 
     /// The rates of the coordinates at stage `i`, which is settled in `trial`.
     fn take_rates(&mut self, i: usize, weight: f64) {
-        let Self { old, trial, stages, .. } = self;
+        let Self { old, trial, stages, carried, .. } = self;
+        for (section, carried) in trial.nodes.iter().chain(&trial.points).zip(carried) {
+            let Section { force, moment, acceleration, .. } = *section;
+            carried[i] = Carried { force, moment, acceleration };
+        }
         for (m, rates) in stages.iter_mut().enumerate() {
             let memory = &trial.memory[m];
             rates[i] = if i == 0 {
@@ -460,7 +562,7 @@ impl Stepper {
             let share = f64::min(done + part, 1.0);
             let from = &begin.boundary;
             let between = |a: &Vector3<f64>, b: &Vector3<f64>| a * (1.0 - share) + b * share;
-            let moved = |from: &Support, section: &pose::Section, to: &Support| {
+            let moved = |from: &Support, section: &Section, to: &Support| {
                 // a support that held something else, or nothing, was not on its way to this one
                 let (r, R) = match from.held == to.held {
                     true => (&from.position, &from.rotation),
@@ -566,8 +668,7 @@ fn scales(mesh: &Mesh, rod: &Rod, old: &State, boundary: &Boundary, time: &Time)
     let length = mesh.length();
     let stiffness = rod.stiffness.amax();
     let finest = mesh.cells.iter().fold(f64::INFINITY, |h, cell| h.min(cell.length));
-    let carried =
-        |field: fn(&pose::Section) -> Vector3<f64>| old.nodes.iter().map(|n| field(n).amax()).fold(0.0, f64::max);
+    let carried = |field: fn(&Section) -> Vector3<f64>| old.nodes.iter().map(|n| field(n).amax()).fold(0.0, f64::max);
     let weight = (rod.mass_per_length * length + rod.tip_mass) * boundary.gravity.amax();
     let force = carried(|n| n.force) + boundary.tip_force.amax() + weight + 1e-3 * stiffness / (length * length);
     let moment = carried(|n| n.moment) + boundary.tip_moment.amax() + 1e-3 * (stiffness / length + weight * length);
