@@ -494,14 +494,7 @@ impl State {
         for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
             section.rotation = so3::orthonormalised(&section.rotation);
         }
-        let stages = mesh.rule.stages;
-        for j in 0..mesh.cells.len() {
-            let R_0 = self.nodes[j].rotation;
-            let sections = self.points[j * stages..][..stages].iter_mut().chain([&mut self.nodes[j + 1]]);
-            for section in sections {
-                section.turn = so3::log_near(&R_0.tr_mul(&section.rotation), &section.turn);
-            }
-        }
+        self.take_turns(mesh);
         let drag = rod.drag_rate();
         for i in 0..self.memory.len() {
             let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
@@ -526,11 +519,7 @@ impl State {
                 self.dt = 0.0;
                 self.rebuild_accelerations(mesh, rod);
                 self.rebuild_velocities(mesh);
-                for i in 0..self.memory.len() {
-                    let u = self.memory[i].travel.velocity.value;
-                    let a = self.remembering(i).acceleration - u * drag;
-                    self.memory[i].travel = Motion::starting(u, a, Vec3::zeros());
-                }
+                self.take_travel(rod);
             }
             Time::Step { scheme, dt, row } => {
                 self.dt = *dt;
@@ -552,6 +541,101 @@ impl State {
                     };
                 }
             }
+        }
+    }
+
+    /// Turns the section that the history `i` belongs to by θ from `begin`, with θ_t and θ_tt, and gives it κ_t; the
+    /// section at the tip follows its cell.
+    pub(crate) fn turn_history(
+        &mut self,
+        i: usize,
+        begin: &Mat3,
+        [theta, theta_t, theta_tt]: [Vec3; 3],
+        kappa_t: Vec3,
+    ) {
+        let map = so3::Tangent::new(&theta);
+        let omega_t = map.times(&theta_tt) + map.by_log(&theta_t) * theta_t;
+        self.memory[i].spin = Motion::starting(map.times(&theta_t), omega_t, Vec3::zeros());
+        self.memory[i].strain = Motion::starting(kappa_t, Vec3::zeros(), Vec3::zeros());
+        if let Some(point) = self.points.get_mut(i) {
+            point.rotation = begin * so3::exp(&theta);
+        }
+    }
+
+    /// All that follows from the rotations and spins of the points and from what acts: positions and their rates from the
+    /// base, n and at the nodes m from the tip, m at the points by its law. For a rod that neither shears nor stretches,
+    /// clamped at its base and free at its tip.
+    pub(crate) fn balance(&mut self, mesh: &Mesh, rod: &Rod, boundary: &Boundary) {
+        let Gauss { stages, a, b, a_inverse, .. } = &mesh.rule;
+        self.boundary = *boundary;
+        self.dt = 0.0;
+        self.carry_nodes(mesh, &boundary.base.rotation);
+        self.take_turns(mesh);
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let first = j * stages;
+            let mut phi = [Vec3::zeros(); MAX_STAGES];
+            for k in 0..*stages {
+                phi[k] = self.points[first + k].turn;
+            }
+            for k in 0..*stages {
+                let g = integral(Vec3::zeros(), 1.0 / cell.length, &a_inverse[k], &phi, *stages);
+                let (point, memory) = (&mut self.points[first + k], &mut self.memory[first + k]);
+                memory.kappa = so3::Tangent::new(&phi[k]).times(&g);
+                let strain = memory.kappa - cell.kappa_rest + rod.damping.component_mul(&memory.strain.velocity.value);
+                point.moment = point.rotation * rod.stiffness.component_mul(&strain);
+            }
+        }
+        self.rebuild_positions(mesh, rod);
+        self.rebuild_accelerations(mesh, rod);
+        self.rebuild_velocities(mesh);
+        self.take_travel(rod);
+
+        let (tip, memory) = (self.tip(), self.tip_memory());
+        let turning = tip.rotation * memory.spin.acceleration.value;
+        let body = (memory.travel.acceleration.value - boundary.gravity) * rod.tip_mass;
+        let (mut n_1, mut m_1) = (boundary.tip_force - body, boundary.tip_moment - turning * rod.tip_inertia);
+        for (j, cell) in mesh.cells.iter().enumerate().rev() {
+            let first = j * stages;
+            (self.nodes[j + 1].force, self.nodes[j + 1].moment) = (n_1, m_1);
+            let (mut n_s, mut m_s) = ([Vec3::zeros(); MAX_STAGES], [Vec3::zeros(); MAX_STAGES]);
+            for l in 0..*stages {
+                n_s[l] = (self.points[first + l].acceleration - boundary.gravity) * rod.mass_per_length;
+            }
+            for k in 0..*stages {
+                let mut rest = [0.0; MAX_STAGES];
+                for l in 0..*stages {
+                    rest[l] = a[k][l] - b[l];
+                }
+                let n = integral(n_1, cell.length, &rest, &n_s, *stages);
+                let point = &mut self.points[first + k];
+                point.force = n;
+                m_s[k] = point.rotation * rotary(rod, &self.memory[first + k].spin) - tangent(rod, point).cross(&n);
+            }
+            n_1 = integral(n_1, -cell.length, b, &n_s, *stages);
+            m_1 = integral(m_1, -cell.length, b, &m_s, *stages);
+        }
+        (self.nodes[0].force, self.nodes[0].moment) = (n_1, m_1);
+    }
+
+    /// Φ of all sections.
+    fn take_turns(&mut self, mesh: &Mesh) {
+        let stages = mesh.rule.stages;
+        for j in 0..mesh.cells.len() {
+            let R_0 = self.nodes[j].rotation;
+            let sections = self.points[j * stages..][..stages].iter_mut().chain([&mut self.nodes[j + 1]]);
+            for section in sections {
+                section.turn = so3::log_near(&R_0.tr_mul(&section.rotation), &section.turn);
+            }
+        }
+    }
+
+    /// a from what the sections balance, as at a start.
+    fn take_travel(&mut self, rod: &Rod) {
+        let drag = rod.drag_rate();
+        for i in 0..self.memory.len() {
+            let u = self.memory[i].travel.velocity.value;
+            let a = self.remembering(i).acceleration - u * drag;
+            self.memory[i].travel = Motion::starting(u, a, Vec3::zeros());
         }
     }
 
@@ -606,6 +690,13 @@ fn acceleration_slope(spin: &Motion, drag: f64) -> Vec3 {
     let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
     let along = omega.cross(&Vec3::z());
     omega.cross(&along) + omega_t.cross(&Vec3::z()) + along * drag
+}
+
+/// Rᵀ times the rate of the spin momentum, ρI ω_t + ω × ρI ω.
+#[inline]
+fn rotary(rod: &Rod, spin: &Motion) -> Vec3 {
+    let (omega, rho_i) = (spin.velocity.value, rod.inertia_per_length);
+    rho_i.component_mul(&spin.acceleration.value) + omega.cross(&rho_i.component_mul(&omega))
 }
 
 /// The law of bending and twist at a point, with the strain rate expressed by the strain:
@@ -693,7 +784,6 @@ impl Equations<'_> {
         };
         let turned = so3::Tangent::new(&theta);
         let spin = time.spin(past, &turned);
-        let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
 
         // a, or its slope
         let r_s = tangent(rod, section);
@@ -706,9 +796,8 @@ impl Equations<'_> {
         };
 
         // eq 5 and eq 6, and p
-        let rho_i = rod.inertia_per_length;
         let n_s = (distributed - self.gravity) * rod.mass_per_length;
-        let rotary = R * (rho_i.component_mul(&omega_t) + omega.cross(&rho_i.component_mul(&omega)));
+        let rotary = R * rotary(rod, &spin);
         let m_s = rotary - r_s.cross(n);
         let p = map.transposed_times(&stress);
         let p_s = map.transposed_times(&R.tr_mul(&m_s)) + map.gradient(&stress, &g);
@@ -977,7 +1066,7 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
     let mut u = boundary.base.velocity;
     for (i, section) in state.points.iter().enumerate() {
         let theta = so3::log(&old.points[i].rotation.tr_mul(&section.rotation));
-        let omega = time.motion(&old.memory[i].spin, &theta).velocity.value;
+        let omega = time.spin(&old.memory[i], &so3::Tangent::new(&theta)).velocity.value;
         let weight = mesh.cells[i / stages].length * mesh.rule.b[i % stages];
         u += section.rotation * omega.cross(&Vec3::z()) * weight;
     }
@@ -1002,12 +1091,11 @@ pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundar
     }
     let rates = |i: usize| {
         let (R, spin) = (&state.points[i].rotation, &state.memory[i].spin);
-        let omega = spin.velocity.value;
         let still = Motion { velocity: spin.velocity, ..Motion::default() };
         Rates {
             w_s: R * acceleration_slope(&still, drag),
             n_s: -boundary.gravity * rod.mass_per_length,
-            m_s: R * omega.cross(&rod.inertia_per_length.component_mul(&omega)),
+            m_s: R * rotary(rod, &still),
             carried: Vec3::zeros(),
             stress: R.tr_mul(&state.points[i].moment),
         }

@@ -33,6 +33,8 @@ const ROUNDINGS: f64 = 256.0;
 
 /// Part of what a stage need not resolve that its iteration may leave: the errors of many steps point one way and add up.
 const PART_LEFT: f64 = 1e-2;
+/// What no iteration of a stage need leave less than.
+const FINEST: f64 = 1e-13;
 /// Part of an increment of Newton's own that it leaves at most: what the Jacobian leaves out, or its square.
 const NEWTON_LEAVES: f64 = 1e-2;
 /// Iterations in which kept factors must be seen to lead there: beyond them new ones cost less.
@@ -187,6 +189,10 @@ pub struct Stepper {
     trial: State,
     /// The sections that a stage begins with.
     guess: State,
+    /// Within the last step of order 4.
+    seen: State,
+    /// Its length, s.
+    span: f64,
     system: System,
     sweep: Sweep,
     /// The rates at the stages of a step of order 4, of everything that has a history.
@@ -207,6 +213,8 @@ impl Stepper {
             old: state.clone(),
             trial: state.clone(),
             guess: state.clone(),
+            seen: state.clone(),
+            span: 0.0,
             state,
             mesh,
             rod,
@@ -310,6 +318,7 @@ impl Stepper {
     pub fn attempt(&mut self, drive: &impl Fn(f64) -> Boundary, h: f64, accuracy: f64) -> Result<Attempt, Diverged> {
         let weight = 1.0 / (runge_kutta::GAMMA * h);
         let time = Time::Stage { weight };
+        self.span = h;
         self.old.copy_from(&self.state);
         self.trial.copy_from(&self.state);
         let begin = drive(0.0);
@@ -337,6 +346,32 @@ impl Stepper {
     /// Makes the attempted step the present state.
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.state, &mut self.trial);
+    }
+
+    /// The rod at the fraction 0 to 1 of the step that was last attempted, under what acts then: to order 4, and consistent
+    /// with the equations of motion. Good until the next step of any kind; nothing but what is returned has changed.
+    pub fn look(&mut self, fraction: f64, boundary: &Boundary) -> &State {
+        let Self { mesh, rod, old, stages, seen, span, .. } = self;
+        seen.copy_from(old);
+        for (m, rates) in stages.iter().enumerate() {
+            let (first, last) = (&rates[0], &rates[runge_kutta::STAGES - 1]);
+            let grown = |rate: fn(&Rates) -> Vector3<f64>| {
+                let sum = |sum, (j, rates)| sum + rate(rates) * (*span * runge_kutta::weight(j));
+                rates.iter().enumerate().fold(Vector3::zeros(), sum)
+            };
+            let begin = [Vector3::zeros(), first.theta_t, first.theta_tt];
+            let end = [grown(|rates| rates.theta_t), last.theta_t, last.theta_tt];
+            let turn = runge_kutta::between(&begin, &end, *span, fraction);
+            let strain = runge_kutta::slope_between(
+                &grown(|rates| rates.kappa_t),
+                [&first.kappa_t, &last.kappa_t],
+                *span,
+                fraction,
+            );
+            seen.turn_history(m, &old.remembering(m).rotation, turn, strain);
+        }
+        seen.balance(mesh, rod, boundary);
+        seen
     }
 
     /// What the stages before stage `i` give of its coordinates, and a guess of it.
@@ -384,7 +419,7 @@ impl Stepper {
     ) -> Result<usize, Diverged> {
         let Self { mesh, rod, system, sweep, old, trial, guess, .. } = self;
         let (scales, rounding) = scales(mesh, rod, old, boundary, time);
-        let target = (accuracy * PART_LEFT).clamp(TOLERANCE * 1e-3, 1e-5);
+        let target = (accuracy * PART_LEFT).clamp(FINEST, 1e-5);
         let mut keep = *factors == Factors::Good;
         let mut borrowed = keep;
         if borrowed {
