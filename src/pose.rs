@@ -194,12 +194,12 @@ impl Time {
     }
 
     /// ω and ω_t of a section that has turned by θ, where `turned` is.
-    #[inline]
+    #[inline(always)]
     fn spin(&self, old: &Memory, turned: &so3::Tangent) -> Motion {
         match self {
             Self::Stage { .. } => {
                 let (rate, rate_t) = self.rates_of_turn(old, turned);
-                let omega_t = turned.times(&rate_t) + turned.by_log(&rate) * rate;
+                let omega_t = turned.times(&rate_t) + turned.by_log_times(&rate, &rate);
                 Motion::starting(turned.times(&rate), omega_t, Vec3::zeros())
             }
             _ => self.motion(&old.spin, turned.log()),
@@ -495,22 +495,8 @@ impl State {
             section.rotation = so3::orthonormalised(&section.rotation);
         }
         self.take_turns(mesh);
+        self.take_rates(mesh, rod, old, time);
         let drag = rod.drag_rate();
-        for i in 0..self.memory.len() {
-            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
-            self.memory[i].spin = time.spin(&old.memory[i], &so3::Tangent::new(&theta));
-        }
-        for (i, section) in self.points.iter().enumerate() {
-            let cell = &mesh.cells[i / mesh.rule.stages];
-            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
-            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(&section.rotation.tr_mul(&section.moment));
-            memory.strain = match time {
-                Time::Stage { weight } => {
-                    Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
-                }
-                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
-            };
-        }
         self.rebuild_positions(mesh, rod);
         match time {
             Time::Static => self.move_rigidly(),
@@ -544,6 +530,32 @@ impl State {
         }
     }
 
+    /// As much of [`Self::settle`] as a stage that others follow needs: its rates.
+    pub(crate) fn settle_within(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
+        self.boundary = *boundary;
+        self.take_rates(mesh, rod, old, time);
+        self.rebuild_velocities(mesh);
+    }
+
+    /// ω and ω_t, κ and its rates.
+    fn take_rates(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, time: &Time) {
+        for i in 0..self.memory.len() {
+            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
+            self.memory[i].spin = time.spin(&old.memory[i], &so3::Tangent::new(&theta));
+        }
+        for (i, section) in self.points.iter().enumerate() {
+            let cell = &mesh.cells[i / mesh.rule.stages];
+            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
+            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(&section.rotation.tr_mul(&section.moment));
+            memory.strain = match time {
+                Time::Stage { weight } => {
+                    Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
+                }
+                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
+            };
+        }
+    }
+
     /// Turns the section that the history `i` belongs to by θ from `begin`, with θ_t and θ_tt, and gives it κ_t; the
     /// section at the tip follows its cell.
     pub(crate) fn turn_history(
@@ -554,7 +566,7 @@ impl State {
         kappa_t: Vec3,
     ) {
         let map = so3::Tangent::new(&theta);
-        let omega_t = map.times(&theta_tt) + map.by_log(&theta_t) * theta_t;
+        let omega_t = map.times(&theta_tt) + map.by_log_times(&theta_t, &theta_t);
         self.memory[i].spin = Motion::starting(map.times(&theta_t), omega_t, Vec3::zeros());
         self.memory[i].strain = Motion::starting(kappa_t, Vec3::zeros(), Vec3::zeros());
         if let Some(point) = self.points.get_mut(i) {
@@ -766,7 +778,7 @@ impl Equations<'_> {
     }
 
     /// At `section` of a cell that begins with `R_0`, which was `begin`, with the memory `past`, at the old instant.
-    #[inline]
+    #[inline(always)]
     fn at(&self, kappa_rest: &Vec3, R_0: &Mat3, section: &Section, begin: &Section, past: &Memory) -> Terms {
         let Self { rod, time, drag, .. } = self;
         let Section { rotation: R, force: n, moment: m, .. } = section;
@@ -871,14 +883,20 @@ impl Equations<'_> {
             let points = &state.points[first..][..K];
             let (begin, past) = (&old.points[first..][..K], &old.memory[first..][..K]);
             let R_0 = &node_0.rotation;
-            let terms: [Terms; K] =
-                std::array::from_fn(|k| self.at(&cell.kappa_rest, R_0, &points[k], &begin[k], &past[k]));
+            let zero = [Vec3::zeros(); K];
+            let (mut log, mut g, mut w_s, mut n_s, mut m_s, mut p, mut p_s) =
+                (zero, zero, zero, zero, zero, zero, zero);
+            for k in 0..K {
+                let terms = self.at(&cell.kappa_rest, R_0, &points[k], &begin[k], &past[k]);
+                (log[k], g[k], w_s[k], n_s[k]) = (*terms.map.log(), terms.g, terms.w_s, terms.n_s);
+                (m_s[k], p[k], p_s[k]) = (terms.m_s, terms.p, terms.p_s);
+                if BLOCKS {
+                    system.points[first + k] = self.derivatives(R_0, &points[k], &past[k], &terms);
+                }
+            }
             let log_1 = so3::log_near(&R_0.tr_mul(&node_1.rotation), &node_1.turn);
             let map = so3::Tangent::new(&log_1);
             if BLOCKS {
-                for k in 0..K {
-                    system.points[first + k] = self.derivatives(R_0, &points[k], &past[k], &terms[k]);
-                }
                 let spin = node_1.rotation * map.jacobian();
                 system.cells[j] = CellEnds {
                     length: h,
@@ -890,26 +908,31 @@ impl Equations<'_> {
 
             let p_1 = map.transposed_times(&node_1.rotation.tr_mul(&node_1.moment));
             let w_0 = self.accumulated(node_0);
-            let sum = |start: Vec3, h: f64, weights: &[f64], slope: fn(&Terms) -> Vec3| {
-                (0..K).fold(start, |sum, l| sum + slope(&terms[l]) * (h * weights[l]))
-            };
             for k in 0..K {
-                let rest: [f64; K] = std::array::from_fn(|l| a[k][l] - b[l]);
+                let forward = a[k].map(|a| h * a);
+                let backward: [f64; MAX_STAGES] = std::array::from_fn(|l| h * (a[k][l] - b[l]));
                 system.residuals.points[first + k] = PointResiduals {
-                    log: terms[k].map.log() - sum(Vec3::zeros(), h, &a[k], |point| point.g),
-                    w: self.accumulated(&points[k]) - sum(w_0, h, &a[k], |point| point.w_s),
-                    n: points[k].force - sum(node_1.force, h, &rest, |point| point.n_s),
-                    p: terms[k].p - sum(p_1, h, &rest, |point| point.p_s),
+                    log: summed(log[k], &forward, &g),
+                    w: summed(self.accumulated(&points[k]) - w_0, &forward, &w_s),
+                    n: summed(points[k].force - node_1.force, &backward, &n_s),
+                    p: summed(p[k] - p_1, &backward, &p_s),
                 };
             }
+            let (forward, backward) = (b.map(|b| h * b), b.map(|b| -h * b));
             system.residuals.cells[j] = EndResiduals {
-                log: log_1 - sum(Vec3::zeros(), h, b, |point| point.g),
-                w: self.accumulated(node_1) - sum(w_0, h, b, |point| point.w_s),
-                n: node_0.force - sum(node_1.force, -h, b, |point| point.n_s),
-                m: node_0.moment - sum(node_1.moment, -h, b, |point| point.m_s),
+                log: summed(log_1, &forward, &g),
+                w: summed(self.accumulated(node_1) - w_0, &forward, &w_s),
+                n: summed(node_0.force - node_1.force, &backward, &n_s),
+                m: summed(node_0.moment - node_1.moment, &backward, &m_s),
             };
         }
     }
+}
+
+/// x − Σ weights_l slopes_l.
+#[inline(always)]
+fn summed<const K: usize>(x: Vec3, weights: &[f64; MAX_STAGES], slopes: &[Vec3; K]) -> Vec3 {
+    (0..K).fold(x, |rest, l| rest - slopes[l] * weights[l])
 }
 
 /// Residuals and blocks at an iterate.

@@ -333,6 +333,17 @@ impl Tangent {
         self.derivative(1.0, x)
     }
 
+    /// ∂(J_r(Φ) x)/∂Φ y.
+    #[inline]
+    pub fn by_log_times(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Vector3<f64> {
+        let Self { phi, b: [b, b_1], d: [d, d_1] } = self;
+        let (once, turned) = (phi.cross(x), y.cross(x));
+        let grown = 2.0 * phi.dot(y);
+        // of x − b Φ×x + d Φ×(Φ×x)
+        phi.cross(&once) * (d_1 * grown) - once * (b_1 * grown) - turned * *b
+            + (y.cross(&once) + phi.cross(&turned)) * *d
+    }
+
     /// ∂(J_rᵀ(Φ) x)/∂Φ.
     #[inline]
     pub fn transposed_by_log(&self, x: &Vector3<f64>) -> Matrix3<f64> {
@@ -542,6 +553,7 @@ mod tests {
             assert!((tangent.transposed_times(&x) - right_jacobian(&phi).tr_mul(&x)).norm() < 1e-14);
             assert!((tangent.inverse_times(&x) - inverse_right_jacobian(&phi) * x).norm() < 1e-14);
             assert!((tangent.inverse() - inverse_right_jacobian(&phi)).amax() < 1e-14);
+            assert!((tangent.by_log_times(&x, &y) - tangent.by_log(&x) * y).norm() < 1e-14);
             assert!((tangent.gradient(&x, &y) - tangent.by_log(&y).tr_mul(&x)).norm() < 1e-14);
             let difference = |f: &dyn Fn(&Vector3<f64>) -> Vector3<f64>| {
                 (f(&(phi + direction * eps)) - f(&(phi - direction * eps))) / (2.0 * eps)

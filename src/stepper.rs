@@ -332,7 +332,9 @@ impl Stepper {
             iterations += self
                 .stage(&boundary, &time, accuracy, &mut factors)
                 .map_err(|diverged| Diverged { iterations: iterations + diverged.iterations, ..diverged })?;
-            self.trial.settle(&self.mesh, &self.rod, &self.old, &boundary, &time);
+            let last = i == runge_kutta::STAGES - 1;
+            let settle = if last { State::settle } else { State::settle_within };
+            settle(&mut self.trial, &self.mesh, &self.rod, &self.old, &boundary, &time);
             self.take_rates(i, weight);
             work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * runge_kutta::weight(i));
         }
