@@ -71,11 +71,11 @@ pub fn error_weight(j: usize) -> f64 {
     weight(j) - EMBEDDED[j]
 }
 
-/// Weights of the stages before stage `i` in what goes on smoothly from them: the parabola through the last three, or as
-/// many as there are, at cᵢ.
-pub fn onward(i: usize) -> [f64; STAGES] {
+/// Weights of the stages before stage `i` in what goes on from them: the polynomial through the last `count`, or as many
+/// as there are, at cᵢ.
+pub fn onward(i: usize, count: usize) -> [f64; STAGES] {
     let mut weights = [0.0; STAGES];
-    let last = i.saturating_sub(3)..i;
+    let last = i.saturating_sub(count)..i;
     for j in last.clone() {
         weights[j] = last.clone().filter(|k| *k != j).map(|k| (C[i] - C[k]) / (C[j] - C[k])).product();
     }
@@ -184,10 +184,12 @@ mod tests {
     #[test]
     fn what_is_smooth_goes_on() {
         for i in 1..STAGES {
-            let weights = onward(i);
-            for degree in 0..i.min(3) as i32 {
-                let sum: f64 = (0..STAGES).map(|j| weights[j] * C[j].powi(degree)).sum();
-                assert!((sum - C[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+            for count in 1..=3 {
+                let weights = onward(i, count);
+                for degree in 0..i.min(count) as i32 {
+                    let sum: f64 = (0..STAGES).map(|j| weights[j] * C[j].powi(degree)).sum();
+                    assert!((sum - C[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+                }
             }
         }
     }

@@ -24,6 +24,8 @@ const MAX_ITERATIONS: usize = 25;
 const MAX_RELAXED_ITERATIONS: usize = 60;
 /// The same in a stage of a step of order 4, which begins with a good guess or is better taken smaller.
 const MAX_STAGE_ITERATIONS: usize = 10;
+/// The same from a guess by which all goes on smoothly, which is given up for a nearer one.
+const MAX_SMOOTH_ITERATIONS: usize = 5;
 /// Largest rotation of a section in one iteration, rad: beyond it the linearisation of a rotation means little.
 const MAX_ROTATION: f64 = 0.7;
 /// Increment, scaled, after which Newton has converged: the next would be of the order of its square.
@@ -155,6 +157,17 @@ enum Factors {
     Good,
     /// The rod turns too much from stage to stage.
     Poor,
+    /// Every iteration has its own, as a stage was lost with others.
+    Unused,
+}
+
+/// What a stage begins with, beyond what the stages before give of it.
+#[derive(Clone, Copy, PartialEq)]
+enum Guess {
+    /// All goes on through the last three stages.
+    Smooth,
+    /// The accelerations go on through the last two, n, m and a are those of the last: less near, and never far.
+    Near,
 }
 
 /// The largest increments of an iteration.
@@ -328,10 +341,22 @@ impl Stepper {
         let mut factors = Factors::Missing;
         for i in 1..runge_kutta::STAGES {
             let boundary = drive(runge_kutta::C[i] * h);
-            self.prepare_stage(i, h, weight, &boundary);
-            iterations += self
-                .stage(&boundary, &time, accuracy, &mut factors)
-                .map_err(|diverged| Diverged { iterations: iterations + diverged.iterations, ..diverged })?;
+            for guess in [Guess::Smooth, Guess::Near] {
+                self.prepare_stage(i, h, weight, &boundary, guess);
+                match self.stage(&boundary, &time, accuracy, &mut factors) {
+                    Ok(taken) => {
+                        iterations += taken;
+                        break;
+                    }
+                    Err(diverged) => {
+                        iterations += diverged.iterations;
+                        factors = Factors::Unused;
+                        if guess == Guess::Near {
+                            return Err(Diverged { iterations, ..diverged });
+                        }
+                    }
+                }
+            }
             let last = i == runge_kutta::STAGES - 1;
             let settle = if last { State::settle } else { State::settle_within };
             settle(&mut self.trial, &self.mesh, &self.rod, &self.old, &boundary, &time);
@@ -350,8 +375,9 @@ impl Stepper {
         std::mem::swap(&mut self.state, &mut self.trial);
     }
 
-    /// The rod at the fraction 0 to 1 of the step that was last attempted, under what acts then: to order 4, and consistent
-    /// with the equations of motion. Good until the next step of any kind; nothing but what is returned has changed.
+    /// The rod at the fraction 0 to 1 of the step of order 4 that was last attempted, under what acts then, consistent with
+    /// the equations of motion: positions and velocities to order 4, accelerations and with them n and m to order 3. Good
+    /// until the next step or equilibrium; nothing but what is returned has changed.
     pub fn look(&mut self, fraction: f64, boundary: &Boundary) -> &State {
         let Self { mesh, rod, old, stages, seen, span, .. } = self;
         seen.copy_from(old);
@@ -377,9 +403,12 @@ impl Stepper {
     }
 
     /// What the stages before stage `i` give of its coordinates, and a guess of it.
-    fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary) {
+    fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary, guess: Guess) {
         let Self { mesh, old, trial, stages, carried, .. } = self;
-        let on = runge_kutta::onward(i);
+        let (on, carried_on) = match guess {
+            Guess::Smooth => (runge_kutta::onward(i, 3), runge_kutta::onward(i, 3)),
+            Guess::Near => (runge_kutta::onward(i, 2), runge_kutta::onward(i, 1)),
+        };
         for (m, rates) in stages.iter().enumerate() {
             let memory = &mut old.memory[m];
             let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
@@ -399,7 +428,7 @@ impl Stepper {
         trial.carry_nodes(mesh, &boundary.base.rotation);
         for (section, carried) in trial.nodes.iter_mut().chain(&mut trial.points).zip(carried) {
             let goes_on = |field: fn(&Carried) -> Vector3<f64>| {
-                (0..i).fold(Vector3::zeros(), |sum, j| sum + field(&carried[j]) * on[j])
+                (0..i).fold(Vector3::zeros(), |sum, j| sum + field(&carried[j]) * carried_on[j])
             };
             section.force = goes_on(|carried| carried.force);
             section.moment = goes_on(|carried| carried.moment);
@@ -468,14 +497,14 @@ impl Stepper {
                 }
                 return Ok(iterations);
             }
-            if factorised == MAX_STAGE_ITERATIONS {
+            if factorised == if *factors == Factors::Unused { MAX_STAGE_ITERATIONS } else { MAX_SMOOTH_ITERATIONS } {
                 return diverged(system, Reason::TooManyIterations);
             }
             let soon = !seen || left * rate.powi(SOON) <= target;
             if borrowed && !soon {
                 *factors = Factors::Poor;
             }
-            (keep, before) = (soon, size);
+            (keep, before) = (soon && *factors != Factors::Unused, size);
         }
     }
 
