@@ -23,6 +23,7 @@ use cosserat_rod::alpha::Scheme;
 use cosserat_rod::boundary::{Boundary, Drive, Rates, Support};
 use cosserat_rod::fmi2::host::Fmu;
 use cosserat_rod::fmi2::variables::Kind;
+use cosserat_rod::integrator::Effort;
 use cosserat_rod::mesh::{Gauss, Mesh};
 use cosserat_rod::package;
 use cosserat_rod::plane::Plane;
@@ -212,7 +213,7 @@ impl Whole {
             Self::Space(Box::new(stepper), boundary)
         } else {
             let drive = Drive { boundary, rates: Rates::default() };
-            let mut plane = Plane::new(&mesh, &rod, Vector3::y(), &base, &RODAS4).expect("a plane rod");
+            let mut plane = Plane::of(&mesh, &rod, &drive, &RODAS4).expect("a plane rod");
             plane.start(&drive).expect("accelerations");
             Self::Plane(Box::new(plane), boundary)
         }
@@ -291,9 +292,9 @@ fn long_rods() -> Result<(), cosserat_rod::unit::Error> {
         }
         let time = start.elapsed().as_secs_f64();
         let outputs = unit.outputs();
-        let all = f64::from(outputs.steps + outputs.retries) * f64::from(outputs.cells);
+        let Effort { steps, retries, .. } = outputs.solver;
+        let all = f64::from(steps + retries) * f64::from(outputs.cells);
         let (cells, stages) = (parameters.cells, if parameters.stages == 0 { 4 } else { parameters.stages });
-        let (steps, retries) = (outputs.steps, outputs.retries);
         println!("{name:>10} {cells:>6} {stages:>7} {steps:>6} {retries:>8} {time:>10.3} {:>22.0}", time * 1e9 / all);
     }
     Ok(())

@@ -45,7 +45,9 @@ use crate::boundary::{Boundary, Held, Support};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::rod::Rod;
 use crate::so3;
-use crate::sweep::{CellEnds, Increment, Joint, Point, Relation, Residuals, Sweep, System};
+use crate::sweep::{
+    CellEnds, EndResiduals, Increment, Joint, Point, PointResiduals, Relation, Residuals, Sweep, System,
+};
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
@@ -191,29 +193,46 @@ impl Time {
         }
     }
 
-    /// ω and ω_t of a section that has turned by `theta`.
-    fn spin(&self, old: &Memory, theta: &Vec3) -> Motion {
-        self.spin_with_derivatives(old, theta).0
+    /// ω and ω_t of a section that has turned by θ, where `turned` is.
+    #[inline(always)]
+    fn spin(&self, old: &Memory, turned: &so3::Tangent) -> Motion {
+        match self {
+            Self::Stage { .. } => {
+                let (rate, rate_t) = self.rates_of_turn(old, turned);
+                let omega_t = turned.times(&rate_t) + turned.by_log_times(&rate, &rate);
+                Motion::starting(turned.times(&rate), omega_t, Vec3::zeros())
+            }
+            _ => self.motion(&old.spin, turned.log()),
+        }
     }
 
-    /// ω and ω_t as [`Self::spin`], with their derivatives by `theta`; in a stage but for terms of the order of θ ω w in
+    /// The derivatives of ω and ω_t by φ in the axes of the section; in a stage but for terms of the order of θ ω w in
     /// that of ω_t, small beside w².
     #[inline]
-    fn spin_with_derivatives(&self, old: &Memory, theta: &Vec3) -> (Motion, Mat3, Mat3) {
+    fn spin_by_turn(&self, old: &Memory, turned: &so3::Tangent) -> (Mat3, Mat3) {
+        let (v, a) = self.weights();
+        let W = turned.inverse();
         match self {
-            Self::Stage { weight } => {
-                let rate = (theta - old.known.theta) * *weight;
-                let rate_t = (rate - old.known.rate) * *weight;
-                let map = so3::Tangent::new(theta);
-                let (J, by_log) = (map.jacobian(), map.by_log(&rate));
-                let spin = Motion::starting(J * rate, J * rate_t + by_log * rate, Vec3::zeros());
-                (spin, J * *weight + by_log, J * (weight * weight) + map.by_log(&rate_t))
+            // of J_r(θ) θ_t and J_r(θ) θ_tt by θ, and J_r W = 1
+            Self::Stage { .. } => {
+                let (rate, rate_t) = self.rates_of_turn(old, turned);
+                let (mut by_turn, mut t_by_turn) = (turned.by_log(&rate) * W, turned.by_log(&rate_t) * W);
+                for i in 0..3 {
+                    by_turn[(i, i)] += v;
+                    t_by_turn[(i, i)] += a;
+                }
+                (by_turn, t_by_turn)
             }
-            _ => {
-                let (v, a) = self.weights();
-                (self.motion(&old.spin, theta), Mat3::from_diagonal_element(v), Mat3::from_diagonal_element(a))
-            }
+            _ => (W * v, W * a),
         }
+    }
+
+    /// θ_t and θ_tt at a stage.
+    #[inline]
+    fn rates_of_turn(&self, old: &Memory, turned: &so3::Tangent) -> (Vec3, Vec3) {
+        let (weight, _) = self.weights();
+        let rate = (turned.log() - old.known.theta) * weight;
+        (rate, (rate - old.known.rate) * weight)
     }
 
     /// κ_t = weight κ + offset.
@@ -407,13 +426,18 @@ impl State {
 
     /// Copies without allocating.
     pub fn copy_from(&mut self, other: &Self) {
-        self.nodes.copy_from_slice(&other.nodes);
-        self.points.copy_from_slice(&other.points);
+        self.copy_sections_from(other);
         self.memory.copy_from_slice(&other.memory);
         self.boundary = other.boundary;
         self.dt = other.dt;
         self.scheme = other.scheme;
         self.row = other.row;
+    }
+
+    /// The sections alone.
+    pub(crate) fn copy_sections_from(&mut self, other: &Self) {
+        self.nodes.copy_from_slice(&other.nodes);
+        self.points.copy_from_slice(&other.points);
     }
 
     /// Applies μ times the increments of a sweep.
@@ -470,30 +494,9 @@ impl State {
         for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
             section.rotation = so3::orthonormalised(&section.rotation);
         }
-        let stages = mesh.rule.stages;
-        for j in 0..mesh.cells.len() {
-            let R_0 = self.nodes[j].rotation;
-            let sections = self.points[j * stages..][..stages].iter_mut().chain([&mut self.nodes[j + 1]]);
-            for section in sections {
-                section.turn = so3::log_near(&R_0.tr_mul(&section.rotation), &section.turn);
-            }
-        }
+        self.take_turns(mesh);
+        self.take_rates(mesh, rod, old, time);
         let drag = rod.drag_rate();
-        for i in 0..self.memory.len() {
-            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
-            self.memory[i].spin = time.spin(&old.memory[i], &theta);
-        }
-        for (i, section) in self.points.iter().enumerate() {
-            let cell = &mesh.cells[i / mesh.rule.stages];
-            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
-            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(section);
-            memory.strain = match time {
-                Time::Stage { weight } => {
-                    Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
-                }
-                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
-            };
-        }
         self.rebuild_positions(mesh, rod);
         match time {
             Time::Static => self.move_rigidly(),
@@ -502,11 +505,7 @@ impl State {
                 self.dt = 0.0;
                 self.rebuild_accelerations(mesh, rod);
                 self.rebuild_velocities(mesh);
-                for i in 0..self.memory.len() {
-                    let u = self.memory[i].travel.velocity.value;
-                    let a = self.remembering(i).acceleration - u * drag;
-                    self.memory[i].travel = Motion::starting(u, a, Vec3::zeros());
-                }
+                self.take_travel(rod);
             }
             Time::Step { scheme, dt, row } => {
                 self.dt = *dt;
@@ -528,6 +527,127 @@ impl State {
                     };
                 }
             }
+        }
+    }
+
+    /// As much of [`Self::settle`] as a stage that others follow needs: its rates.
+    pub(crate) fn settle_within(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
+        self.boundary = *boundary;
+        self.take_rates(mesh, rod, old, time);
+        self.rebuild_velocities(mesh);
+    }
+
+    /// ω and ω_t, κ and its rates.
+    fn take_rates(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, time: &Time) {
+        for i in 0..self.memory.len() {
+            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
+            self.memory[i].spin = time.spin(&old.memory[i], &so3::Tangent::new(&theta));
+        }
+        for (i, section) in self.points.iter().enumerate() {
+            let cell = &mesh.cells[i / mesh.rule.stages];
+            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
+            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(&section.rotation.tr_mul(&section.moment));
+            memory.strain = match time {
+                Time::Stage { weight } => {
+                    Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
+                }
+                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
+            };
+        }
+    }
+
+    /// Turns the section that the history `i` belongs to by θ from `begin`, with θ_t and θ_tt, and gives it κ_t; the
+    /// section at the tip follows its cell.
+    pub(crate) fn turn_history(
+        &mut self,
+        i: usize,
+        begin: &Mat3,
+        [theta, theta_t, theta_tt]: [Vec3; 3],
+        kappa_t: Vec3,
+    ) {
+        let map = so3::Tangent::new(&theta);
+        let omega_t = map.times(&theta_tt) + map.by_log_times(&theta_t, &theta_t);
+        self.memory[i].spin = Motion::starting(map.times(&theta_t), omega_t, Vec3::zeros());
+        self.memory[i].strain = Motion::starting(kappa_t, Vec3::zeros(), Vec3::zeros());
+        if let Some(point) = self.points.get_mut(i) {
+            point.rotation = begin * so3::exp(&theta);
+        }
+    }
+
+    /// All that follows from the rotations and spins of the points and from what acts: positions and their rates from the
+    /// base, n and at the nodes m from the tip, m at the points by its law. For a rod that neither shears nor stretches,
+    /// clamped at its base and free at its tip.
+    pub(crate) fn balance(&mut self, mesh: &Mesh, rod: &Rod, boundary: &Boundary) {
+        let Gauss { stages, a, b, a_inverse, .. } = &mesh.rule;
+        self.boundary = *boundary;
+        self.dt = 0.0;
+        self.carry_nodes(mesh, &boundary.base.rotation);
+        self.take_turns(mesh);
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let first = j * stages;
+            let mut phi = [Vec3::zeros(); MAX_STAGES];
+            for k in 0..*stages {
+                phi[k] = self.points[first + k].turn;
+            }
+            for k in 0..*stages {
+                let g = integral(Vec3::zeros(), 1.0 / cell.length, &a_inverse[k], &phi, *stages);
+                let (point, memory) = (&mut self.points[first + k], &mut self.memory[first + k]);
+                memory.kappa = so3::Tangent::new(&phi[k]).times(&g);
+                let strain = memory.kappa - cell.kappa_rest + rod.damping.component_mul(&memory.strain.velocity.value);
+                point.moment = point.rotation * rod.stiffness.component_mul(&strain);
+            }
+        }
+        self.rebuild_positions(mesh, rod);
+        self.rebuild_accelerations(mesh, rod);
+        self.rebuild_velocities(mesh);
+        self.take_travel(rod);
+
+        let (tip, memory) = (self.tip(), self.tip_memory());
+        let turning = tip.rotation * memory.spin.acceleration.value;
+        let body = (memory.travel.acceleration.value - boundary.gravity) * rod.tip_mass;
+        let (mut n_1, mut m_1) = (boundary.tip_force - body, boundary.tip_moment - turning * rod.tip_inertia);
+        for (j, cell) in mesh.cells.iter().enumerate().rev() {
+            let first = j * stages;
+            (self.nodes[j + 1].force, self.nodes[j + 1].moment) = (n_1, m_1);
+            let (mut n_s, mut m_s) = ([Vec3::zeros(); MAX_STAGES], [Vec3::zeros(); MAX_STAGES]);
+            for l in 0..*stages {
+                n_s[l] = (self.points[first + l].acceleration - boundary.gravity) * rod.mass_per_length;
+            }
+            for k in 0..*stages {
+                let mut rest = [0.0; MAX_STAGES];
+                for l in 0..*stages {
+                    rest[l] = a[k][l] - b[l];
+                }
+                let n = integral(n_1, cell.length, &rest, &n_s, *stages);
+                let point = &mut self.points[first + k];
+                point.force = n;
+                m_s[k] = point.rotation * rotary(rod, &self.memory[first + k].spin) - tangent(rod, point).cross(&n);
+            }
+            n_1 = integral(n_1, -cell.length, b, &n_s, *stages);
+            m_1 = integral(m_1, -cell.length, b, &m_s, *stages);
+        }
+        (self.nodes[0].force, self.nodes[0].moment) = (n_1, m_1);
+    }
+
+    /// Φ of all sections.
+    fn take_turns(&mut self, mesh: &Mesh) {
+        let stages = mesh.rule.stages;
+        for j in 0..mesh.cells.len() {
+            let R_0 = self.nodes[j].rotation;
+            let sections = self.points[j * stages..][..stages].iter_mut().chain([&mut self.nodes[j + 1]]);
+            for section in sections {
+                section.turn = so3::log_near(&R_0.tr_mul(&section.rotation), &section.turn);
+            }
+        }
+    }
+
+    /// a from what the sections balance, as at a start.
+    fn take_travel(&mut self, rod: &Rod) {
+        let drag = rod.drag_rate();
+        for i in 0..self.memory.len() {
+            let u = self.memory[i].travel.velocity.value;
+            let a = self.remembering(i).acceleration - u * drag;
+            self.memory[i].travel = Motion::starting(u, a, Vec3::zeros());
         }
     }
 
@@ -584,6 +704,13 @@ fn acceleration_slope(spin: &Motion, drag: f64) -> Vec3 {
     omega.cross(&along) + omega_t.cross(&Vec3::z()) + along * drag
 }
 
+/// Rᵀ times the rate of the spin momentum, ρI ω_t + ω × ρI ω.
+#[inline]
+fn rotary(rod: &Rod, spin: &Motion) -> Vec3 {
+    let (omega, rho_i) = (spin.velocity.value, rod.inertia_per_length);
+    rho_i.component_mul(&spin.acceleration.value) + omega.cross(&rho_i.component_mul(&omega))
+}
+
 /// The law of bending and twist at a point, with the strain rate expressed by the strain:
 /// Rᵀm = K_eff (κ − κ_eff), K_eff = K (1 + τ ∂κ_t/∂κ).
 struct Law {
@@ -601,12 +728,214 @@ impl Law {
     }
 
     #[inline]
-    fn kappa(&self, section: &Section) -> Vec3 {
-        self.kappa_free + section.rotation.tr_mul(&section.moment).component_div(&self.stiffness)
+    fn kappa(&self, stress: &Vec3) -> Vec3 {
+        self.kappa_free + stress.component_div(&self.stiffness)
     }
 }
 
-/// Residuals and blocks of all cells at an iterate.
+/// What the equations say at one Gauss point of an iterate.
+struct Terms {
+    law: Law,
+    /// Rᵀm.
+    stress: Vec3,
+    /// J_r at Φ.
+    map: so3::Tangent,
+    /// g, p and p'.
+    g: Vec3,
+    p: Vec3,
+    p_s: Vec3,
+    /// J_r at the turn θ since the old instant.
+    turned: so3::Tangent,
+    /// ω and ω_t.
+    spin: Motion,
+    /// r_s, and of w the slope; n_s.
+    r_s: Vec3,
+    w_s: Vec3,
+    n_s: Vec3,
+    /// R (ρI ω_t + ω × ρI ω), and m_s.
+    rotary: Vec3,
+    m_s: Vec3,
+}
+
+/// One statement of the equations, for their residuals and for their derivatives.
+struct Equations<'a> {
+    rod: &'a Rod,
+    time: &'a Time,
+    gravity: Vec3,
+    drag: f64,
+    row: Row,
+    extensible: bool,
+}
+
+impl Equations<'_> {
+    /// The unknown that is accumulated.
+    #[inline]
+    fn accumulated(&self, section: &Section) -> Vec3 {
+        match self.row {
+            Row::Rotations => section.acceleration,
+            Row::Positions => section.position,
+        }
+    }
+
+    /// At `section` of a cell that begins with `R_0`, which was `begin`, with the memory `past`, at the old instant.
+    #[inline(always)]
+    fn at(&self, kappa_rest: &Vec3, R_0: &Mat3, section: &Section, begin: &Section, past: &Memory) -> Terms {
+        let Self { rod, time, drag, .. } = self;
+        let Section { rotation: R, force: n, moment: m, .. } = section;
+
+        // R_s = R κ̂ as Φ_s = J_r⁻¹(Φ) κ, and the law
+        let law = Law::new(rod, kappa_rest, time, past);
+        let stress = R.tr_mul(m);
+        let map = so3::Tangent::new(&so3::log_near(&R_0.tr_mul(R), &section.turn));
+        let g = map.inverse_times(&law.kappa(&stress));
+
+        // ω and ω_t from the history
+        let theta = match time {
+            Time::Static => Vec3::zeros(),
+            _ => so3::log(&begin.rotation.tr_mul(R)),
+        };
+        let turned = so3::Tangent::new(&theta);
+        let spin = time.spin(past, &turned);
+
+        // a, or its slope
+        let r_s = tangent(rod, section);
+        let (w_s, distributed) = match self.row {
+            Row::Rotations => (R * acceleration_slope(&spin, *drag), section.acceleration),
+            Row::Positions => {
+                let travel = time.motion(&past.travel, &(section.position - begin.position));
+                (r_s, travel.acceleration.value + travel.velocity.value * *drag)
+            }
+        };
+
+        // eq 5 and eq 6, and p
+        let n_s = (distributed - self.gravity) * rod.mass_per_length;
+        let rotary = R * rotary(rod, &spin);
+        let m_s = rotary - r_s.cross(n);
+        let p = map.transposed_times(&stress);
+        let p_s = map.transposed_times(&R.tr_mul(&m_s)) + map.gradient(&stress, &g);
+        Terms { law, stress, map, g, p, p_s, turned, spin, r_s, w_s, n_s, rotary, m_s }
+    }
+
+    /// The derivatives of what [`Self::at`] says.
+    #[inline]
+    fn derivatives(&self, R_0: &Mat3, section: &Section, past: &Memory, terms: &Terms) -> Point {
+        let Self { rod, time, drag, .. } = self;
+        let Section { rotation: R, force: n, .. } = section;
+        let Terms { law, stress, map, g, turned, spin, r_s, w_s, rotary, m_s, .. } = terms;
+        let (omega, e_3) = (spin.velocity.value, Vec3::z());
+
+        // of p and p' as far as the law has a part in them; Tᵀ m' = J_r(Φ) R₀ᵀ m'
+        let (J, D) = (map.jacobian(), map.by_log(g));
+        let (K_J, K_D) = (so3::rows_scaled(&law.stiffness, &J), so3::rows_scaled(&law.stiffness, &D));
+        let spin_map = R * J;
+
+        // of ω and ω_t
+        let (by_turn, t_by_turn) = time.spin_by_turn(past, turned);
+        let to_body = R.transpose();
+        let (omega_phi, omega_t_phi) = (by_turn * to_body, t_by_turn * to_body);
+
+        // of r_s
+        let mut r_s_phi = -so3::hat(r_s);
+        let (mut w_n, mut m_n) = (Mat3::zeros(), -so3::hat(r_s));
+        if self.extensible {
+            w_n = so3::columns_scaled(R, &rod.compliance) * to_body;
+            r_s_phi += w_n * so3::hat(n);
+            m_n += so3::hat_times(n, &w_n);
+        }
+
+        // of w'
+        let w_phi = match self.row {
+            Row::Rotations => {
+                let mut by_omega = omega * e_3.transpose() - e_3 * omega.transpose() * 2.0;
+                so3::add_hat(&mut by_omega, &(e_3 * -*drag), omega.z);
+                R * (by_omega * omega_phi - so3::hat_times(&e_3, &omega_t_phi)) - so3::hat(w_s)
+            }
+            Row::Positions => r_s_phi,
+        };
+
+        // of m'
+        let rho_i = rod.inertia_per_length;
+        let by_omega = so3::columns_scaled(&so3::hat(&omega), &rho_i) - so3::hat(&rho_i.component_mul(&omega));
+        let by_phi = by_omega * omega_phi + so3::rows_scaled(&rho_i, &omega_t_phi);
+        Point {
+            spin: spin_map,
+            w_phi,
+            w_n,
+            m_phi: R * by_phi - so3::hat(rotary) + so3::hat_times(n, &r_s_phi),
+            m_n,
+            p_strain: so3::symmetric_product(&J, &K_J),
+            p_log: J.tr_mul(&K_D) + map.transposed_by_log(stress),
+            slope_log: so3::symmetric_product(&D, &K_D) + map.hessian(stress, g) + map.by_log(&R_0.tr_mul(m_s)),
+            slope_phi: -so3::hat_times(m_s, &spin_map).transpose(),
+            law_strain: K_J,
+            law_log: K_D,
+        }
+    }
+}
+
+impl Equations<'_> {
+    fn cells<const K: usize, const BLOCKS: bool>(&self, mesh: &Mesh, old: &State, state: &State, system: &mut System) {
+        let Gauss { a, b, .. } = &mesh.rule;
+        for (j, cell) in mesh.cells.iter().enumerate() {
+            let h = cell.length;
+            let (node_0, node_1) = (&state.nodes[j], &state.nodes[j + 1]);
+            let first = j * K;
+            let points = &state.points[first..][..K];
+            let (begin, past) = (&old.points[first..][..K], &old.memory[first..][..K]);
+            let R_0 = &node_0.rotation;
+            let zero = [Vec3::zeros(); K];
+            let (mut log, mut g, mut w_s, mut n_s, mut m_s, mut p, mut p_s) =
+                (zero, zero, zero, zero, zero, zero, zero);
+            for k in 0..K {
+                let terms = self.at(&cell.kappa_rest, R_0, &points[k], &begin[k], &past[k]);
+                (log[k], g[k], w_s[k], n_s[k]) = (*terms.map.log(), terms.g, terms.w_s, terms.n_s);
+                (m_s[k], p[k], p_s[k]) = (terms.m_s, terms.p, terms.p_s);
+                if BLOCKS {
+                    system.points[first + k] = self.derivatives(R_0, &points[k], &past[k], &terms);
+                }
+            }
+            let log_1 = so3::log_near(&R_0.tr_mul(&node_1.rotation), &node_1.turn);
+            let map = so3::Tangent::new(&log_1);
+            if BLOCKS {
+                let spin = node_1.rotation * map.jacobian();
+                system.cells[j] = CellEnds {
+                    length: h,
+                    spin,
+                    p_log: map.by_log(&R_0.tr_mul(&node_1.moment)),
+                    p_phi: -so3::hat_times(&node_1.moment, &spin).transpose(),
+                };
+            }
+
+            let p_1 = map.transposed_times(&node_1.rotation.tr_mul(&node_1.moment));
+            let w_0 = self.accumulated(node_0);
+            for k in 0..K {
+                let forward = a[k].map(|a| h * a);
+                let backward: [f64; MAX_STAGES] = std::array::from_fn(|l| h * (a[k][l] - b[l]));
+                system.residuals.points[first + k] = PointResiduals {
+                    log: summed(log[k], &forward, &g),
+                    w: summed(self.accumulated(&points[k]) - w_0, &forward, &w_s),
+                    n: summed(points[k].force - node_1.force, &backward, &n_s),
+                    p: summed(p[k] - p_1, &backward, &p_s),
+                };
+            }
+            let (forward, backward) = (b.map(|b| h * b), b.map(|b| -h * b));
+            system.residuals.cells[j] = EndResiduals {
+                log: summed(log_1, &forward, &g),
+                w: summed(self.accumulated(node_1) - w_0, &forward, &w_s),
+                n: summed(node_0.force - node_1.force, &backward, &n_s),
+                m: summed(node_0.moment - node_1.moment, &backward, &m_s),
+            };
+        }
+    }
+}
+
+/// x − Σ weights_l slopes_l.
+#[inline(always)]
+fn summed<const K: usize>(x: Vec3, weights: &[f64; MAX_STAGES], slopes: &[Vec3; K]) -> Vec3 {
+    (0..K).fold(x, |rest, l| rest - slopes[l] * weights[l])
+}
+
+/// Residuals and blocks at an iterate.
 pub fn assemble(
     mesh: &Mesh,
     rod: &Rod,
@@ -616,148 +945,47 @@ pub fn assemble(
     time: &Time,
     system: &mut System,
 ) {
-    let Gauss { stages, a, b, .. } = &mesh.rule;
-    let stages = *stages;
+    assemble_parts::<true>(mesh, rod, old, state, boundary, time, system);
+}
+
+/// The residuals alone, for factors that are kept.
+pub fn assemble_residuals(
+    mesh: &Mesh,
+    rod: &Rod,
+    old: &State,
+    state: &State,
+    boundary: &Boundary,
+    time: &Time,
+    system: &mut System,
+) {
+    assemble_parts::<false>(mesh, rod, old, state, boundary, time, system);
+}
+
+/// Of the cells the residuals and, where asked, the blocks; and the ends.
+fn assemble_parts<const BLOCKS: bool>(
+    mesh: &Mesh,
+    rod: &Rod,
+    old: &State,
+    state: &State,
+    boundary: &Boundary,
+    time: &Time,
+    system: &mut System,
+) {
     let (weight_v, weight_a) = time.weights();
     let drag = rod.drag_rate();
     let row = time.row();
-    let (rho_a, gravity) = (rod.mass_per_length, boundary.gravity);
-    let rho_i = rod.inertia_per_length;
-    let e_3 = Vec3::z();
-
+    let gravity = boundary.gravity;
     system.mass = match row {
-        Row::Rotations => rho_a,
-        Row::Positions => rho_a * (weight_a + drag * weight_v),
+        Row::Rotations => rod.mass_per_length,
+        Row::Positions => rod.mass_per_length * (weight_a + drag * weight_v),
     };
-    let accumulated = |section: &Section| match row {
-        Row::Rotations => section.acceleration,
-        Row::Positions => section.position,
-    };
-
-    for (j, cell) in mesh.cells.iter().enumerate() {
-        let h = cell.length;
-        let (node_0, node_1) = (&state.nodes[j], &state.nodes[j + 1]);
-        let first = j * stages;
-        let mut log = [Vec3::zeros(); MAX_STAGES];
-        let mut g = [Vec3::zeros(); MAX_STAGES];
-        let mut w_s = [Vec3::zeros(); MAX_STAGES];
-        let mut n_s = [Vec3::zeros(); MAX_STAGES];
-        let mut m_s = [Vec3::zeros(); MAX_STAGES];
-        let mut p = [Vec3::zeros(); MAX_STAGES];
-        let mut p_s = [Vec3::zeros(); MAX_STAGES];
-
-        for k in 0..stages {
-            let section = &state.points[first + k];
-            let past = &old.memory[first + k];
-            let Section { rotation: R, force: n, moment: m, .. } = section;
-            let point: &mut Point = &mut system.points[first + k];
-
-            // R_s = R κ̂ as Φ_s = J_r⁻¹(Φ) κ, and the law
-            let law = Law::new(rod, &cell.kappa_rest, time, past);
-            let phi = so3::log_near(&node_0.rotation.tr_mul(R), &section.turn);
-            let map = so3::Tangent::new(&phi);
-            let phi_s = map.inverse_times(&law.kappa(section));
-            let (J, D) = (map.jacobian(), map.by_log(&phi_s));
-            (log[k], g[k]) = (phi, phi_s);
-            point.spin = R * J;
-            let (K_J, K_D) = (so3::rows_scaled(&law.stiffness, &J), so3::rows_scaled(&law.stiffness, &D));
-            (point.law_strain, point.law_log) = (K_J, K_D);
-            // p, and p' as far as the law has a part in it
-            let stress = R.tr_mul(m);
-            p[k] = J.tr_mul(&stress);
-            p_s[k] = D.tr_mul(&stress);
-            point.p_strain = so3::symmetric_product(&J, &K_J);
-            point.p_log = J.tr_mul(&K_D) + map.transposed_by_log(&stress);
-            point.slope_log = so3::symmetric_product(&D, &K_D) + map.hessian(&stress, &phi_s);
-
-            // ω and ω_t from the history, and their derivatives by φ
-            let (spin, omega_phi, omega_t_phi) = match time {
-                Time::Static => (Motion::default(), Mat3::zeros(), Mat3::zeros()),
-                _ => {
-                    let theta = so3::log(&old.points[first + k].rotation.tr_mul(R));
-                    let W = so3::inverse_right_jacobian(&theta) * R.transpose();
-                    let (spin, by_theta, t_by_theta) = time.spin_with_derivatives(past, &theta);
-                    (spin, by_theta * W, t_by_theta * W)
-                }
-            };
-            let (omega, omega_t) = (spin.velocity.value, spin.acceleration.value);
-
-            // r_s
-            let r_s = tangent(rod, section);
-            let mut r_s_phi = -so3::hat(&r_s);
-            point.w_n = Mat3::zeros();
-            if system.extensible {
-                point.w_n = so3::columns_scaled(R, &rod.compliance) * R.transpose();
-                r_s_phi += point.w_n * so3::hat(n);
-            }
-
-            // a, or its slope
-            let distributed = match row {
-                Row::Rotations => {
-                    let slope = acceleration_slope(&spin, drag);
-                    let mut by_omega = omega * e_3.transpose() - e_3 * omega.transpose() * 2.0;
-                    so3::add_hat(&mut by_omega, &(e_3 * -drag), omega.z);
-                    w_s[k] = R * slope;
-                    point.w_phi = R * (by_omega * omega_phi - so3::hat_times(&e_3, &omega_t_phi)) - so3::hat(&w_s[k]);
-                    section.acceleration
-                }
-                Row::Positions => {
-                    w_s[k] = r_s;
-                    point.w_phi = r_s_phi;
-                    let travel = time.motion(&past.travel, &(section.position - old.points[first + k].position));
-                    travel.acceleration.value + travel.velocity.value * drag
-                }
-            };
-
-            // eq 5 and eq 6
-            n_s[k] = (distributed - gravity) * rho_a;
-            let spin_momentum = rho_i.component_mul(&omega);
-            let rotary = R * (rho_i.component_mul(&omega_t) + omega.cross(&spin_momentum));
-            let by_omega = so3::columns_scaled(&so3::hat(&omega), &rho_i) - so3::hat(&spin_momentum);
-            let mut by_phi = by_omega * omega_phi;
-            for row in 0..3 {
-                for column in 0..3 {
-                    by_phi[(row, column)] += rho_i[row] * omega_t_phi[(row, column)];
-                }
-            }
-            m_s[k] = rotary - r_s.cross(n);
-            point.m_phi = R * by_phi - so3::hat(&rotary) + so3::hat_times(n, &r_s_phi);
-            point.m_n = -so3::hat(&r_s);
-            if system.extensible {
-                point.m_n += so3::hat_times(n, &point.w_n);
-            }
-            p_s[k] += point.spin.tr_mul(&m_s[k]);
-            // Tᵀ m' = J_r(Φ) R₀ᵀ m'
-            point.slope_log += map.by_log(&node_0.rotation.tr_mul(&m_s[k]));
-            point.slope_phi = -so3::hat_times(&m_s[k], &point.spin).transpose();
-        }
-
-        let log_1 = so3::log_near(&node_0.rotation.tr_mul(&node_1.rotation), &node_1.turn);
-        let map = so3::Tangent::new(&log_1);
-        let ends: &mut CellEnds = &mut system.cells[j];
-        ends.length = h;
-        ends.spin = node_1.rotation * map.jacobian();
-        ends.p_log = map.by_log(&node_0.rotation.tr_mul(&node_1.moment));
-        ends.p_phi = -so3::hat_times(&node_1.moment, &ends.spin).transpose();
-        let p_1 = ends.spin.tr_mul(&node_1.moment);
-        let w_0 = accumulated(node_0);
-        for k in 0..stages {
-            let section = &state.points[first + k];
-            let residuals = &mut system.residuals.points[first + k];
-            residuals.log = log[k] - integral(Vec3::zeros(), h, &a[k], &g, stages);
-            residuals.w = accumulated(section) - integral(w_0, h, &a[k], &w_s, stages);
-            let mut rest = [0.0; MAX_STAGES];
-            for l in 0..stages {
-                rest[l] = a[k][l] - b[l];
-            }
-            residuals.n = section.force - integral(node_1.force, h, &rest, &n_s, stages);
-            residuals.p = p[k] - integral(p_1, h, &rest, &p_s, stages);
-        }
-        let ends = &mut system.residuals.cells[j];
-        ends.log = log_1 - integral(Vec3::zeros(), h, b, &g, stages);
-        ends.w = accumulated(node_1) - integral(w_0, h, b, &w_s, stages);
-        ends.n = node_0.force - integral(node_1.force, -h, b, &n_s, stages);
-        ends.m = node_0.moment - integral(node_1.moment, -h, b, &m_s, stages);
+    let equations = Equations { rod, time, gravity, drag, row, extensible: system.extensible };
+    let accumulated = |section: &Section| equations.accumulated(section);
+    match mesh.rule.stages {
+        1 => equations.cells::<1, BLOCKS>(mesh, old, state, system),
+        2 => equations.cells::<2, BLOCKS>(mesh, old, state, system),
+        3 => equations.cells::<3, BLOCKS>(mesh, old, state, system),
+        _ => equations.cells::<4, BLOCKS>(mesh, old, state, system),
     }
 
     // the base is where its path says, or free of load
@@ -795,10 +1023,10 @@ pub fn assemble(
         system.tip_load.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
     }
     if rod.tip_inertia > 0.0 && *time != Time::Static {
-        let theta = so3::log(&old_tip.rotation.tr_mul(&tip.rotation));
+        let turned = so3::Tangent::new(&so3::log(&old_tip.rotation.tr_mul(&tip.rotation)));
         let R = tip.rotation;
-        let turning = R * time.spin(past, &theta).acceleration.value;
-        let W = so3::inverse_right_jacobian(&theta) * R.transpose();
+        let turning = R * time.spin(past, &turned).acceleration.value;
+        let W = turned.inverse() * R.transpose();
         residuals.tip_load.1 -= turning * rod.tip_inertia;
         system.tip_load.m_phi = (so3::hat(&turning) - R * W * weight_a) * rod.tip_inertia;
     }
@@ -861,7 +1089,7 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
     let mut u = boundary.base.velocity;
     for (i, section) in state.points.iter().enumerate() {
         let theta = so3::log(&old.points[i].rotation.tr_mul(&section.rotation));
-        let omega = time.spin(&old.memory[i], &theta).velocity.value;
+        let omega = time.spin(&old.memory[i], &so3::Tangent::new(&theta)).velocity.value;
         let weight = mesh.cells[i / stages].length * mesh.rule.b[i % stages];
         u += section.rotation * omega.cross(&Vec3::z()) * weight;
     }
@@ -886,12 +1114,11 @@ pub fn assemble_accelerations(mesh: &Mesh, rod: &Rod, state: &mut State, boundar
     }
     let rates = |i: usize| {
         let (R, spin) = (&state.points[i].rotation, &state.memory[i].spin);
-        let omega = spin.velocity.value;
         let still = Motion { velocity: spin.velocity, ..Motion::default() };
         Rates {
             w_s: R * acceleration_slope(&still, drag),
             n_s: -boundary.gravity * rod.mass_per_length,
-            m_s: R * omega.cross(&rod.inertia_per_length.component_mul(&omega)),
+            m_s: R * rotary(rod, &still),
             carried: Vec3::zeros(),
             stress: R.tr_mul(&state.points[i].moment),
         }

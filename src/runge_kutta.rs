@@ -13,6 +13,7 @@
 //! v = w (x − x₀ − h Σ_{j<i} aᵢⱼ vⱼ)      a = w (v − v₀ − h Σ_{j<i} aᵢⱼ aⱼ)      w = 1/(γ h)
 //! ```
 
+use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 
 /// s, the explicit first stage included.
@@ -70,6 +71,39 @@ pub fn error_weight(j: usize) -> f64 {
     weight(j) - EMBEDDED[j]
 }
 
+/// Weights of the stages before stage `i` in what goes on from them: the polynomial through the last `count`, or as many
+/// as there are, at cᵢ.
+pub fn onward(i: usize, count: usize) -> [f64; STAGES] {
+    let mut weights = [0.0; STAGES];
+    let last = i.saturating_sub(count)..i;
+    for j in last.clone() {
+        weights[j] = last.clone().filter(|k| *k != j).map(|k| (C[i] - C[k]) / (C[j] - C[k])).product();
+    }
+    weights
+}
+
+/// y, y' and y'' at the fraction x of a step of `h` between the same at its ends: the polynomial of degree 5 through them.
+pub fn between(begin: &[Vector3<f64>; 3], end: &[Vector3<f64>; 3], h: f64, x: f64) -> [Vector3<f64>; 3] {
+    let [y_0, v_0, a_0] = begin;
+    let (v_0, a_0) = (v_0 * h, a_0 * (h * h));
+    // what the parabola of the beginning misses at the end
+    let y = end[0] - y_0 - v_0 - a_0 * 0.5;
+    let v = end[1] * h - v_0 - a_0;
+    let a = end[2] * (h * h) - a_0;
+    let (c_3, c_4, c_5) = (y * 10.0 - v * 4.0 + a * 0.5, v * 7.0 - y * 15.0 - a, y * 6.0 - v * 3.0 + a * 0.5);
+    [
+        y_0 + (v_0 + (a_0 * 0.5 + (c_3 + (c_4 + c_5 * x) * x) * x) * x) * x,
+        (v_0 + (a_0 + (c_3 * 3.0 + (c_4 * 4.0 + c_5 * (5.0 * x)) * x) * x) * x) / h,
+        (a_0 + (c_3 * 6.0 + (c_4 * 12.0 + c_5 * (20.0 * x)) * x) * x) / (h * h),
+    ]
+}
+
+/// y' there, of the polynomial of degree 3 that grows by `growth` with these slopes at its ends.
+pub fn slope_between(growth: &Vector3<f64>, [begin, end]: [&Vector3<f64>; 2], h: f64, x: f64) -> Vector3<f64> {
+    let mean = growth / h;
+    begin + (mean * 3.0 - begin * 2.0 - end) * (2.0 * x) + (begin + end - mean * 2.0) * (3.0 * x * x)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,6 +144,41 @@ mod tests {
         for i in 1..STAGES {
             // stages of order 2
             assert!((times(&one)[i] - C[i]).abs() < 1e-14 && (ac[i] - 0.5 * c2[i]).abs() < 1e-14, "stage {i}");
+        }
+    }
+
+    #[test]
+    fn between_its_ends_a_step_is_a_polynomial() {
+        // y = 1 + 2 t − t² + t³/2 + 3 t⁴ − t⁵ on [0, h]
+        let at = |t: f64| {
+            let y = 1.0 + t * (2.0 + t * (-1.0 + t * (0.5 + t * (3.0 - t))));
+            let y_t = 2.0 + t * (-2.0 + t * (1.5 + t * (12.0 - 5.0 * t)));
+            [y, y_t, -2.0 + t * (3.0 + t * (36.0 - 20.0 * t))].map(|x| Vector3::x() * x)
+        };
+        let h = 0.7;
+        for x in [0.0, 0.3, 1.0] {
+            let (found, exact) = (between(&at(0.0), &at(h), h, x), at(x * h));
+            assert!((0..3).all(|k| (found[k] - exact[k]).norm() < 1e-13), "{x}: {found:?}");
+        }
+        // y = t³ − t²
+        let slope = |t: f64| Vector3::x() * (3.0 * t * t - 2.0 * t);
+        let growth = Vector3::x() * (h.powi(3) - h * h);
+        for x in [0.0, 0.3, 1.0] {
+            let found = slope_between(&growth, [&slope(0.0), &slope(h)], h, x);
+            assert!((found - slope(x * h)).norm() < 1e-14, "{x}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_is_smooth_goes_on() {
+        for i in 1..STAGES {
+            for count in 1..=3 {
+                let weights = onward(i, count);
+                for degree in 0..i.min(count) as i32 {
+                    let sum: f64 = (0..STAGES).map(|j| weights[j] * C[j].powi(degree)).sum();
+                    assert!((sum - C[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+                }
+            }
         }
     }
 

@@ -145,6 +145,31 @@ pub fn exp(phi: &Vector3<f64>) -> Matrix3<f64> {
     rotation + hat(&(phi * a))
 }
 
+/// Below this x² the rational function of [`arc_sine_rest`] is exact to rounding.
+const ARC_SINE: f64 = 0.25;
+
+/// (asin(x)/x − 1)/x² at x²: the rational function of `e_asin.c` in fdlibm, Sun Microsystems 1993, whose relative error
+/// is 2⁻⁵⁸.⁷⁵.
+#[inline]
+fn arc_sine_rest(x2: f64) -> f64 {
+    const P: [f64; 6] = [
+        1.666_666_666_666_666_574_15e-1,
+        -3.255_658_186_224_009_154_05e-1,
+        2.012_125_321_348_629_258_81e-1,
+        -4.005_553_450_067_941_140_27e-2,
+        7.915_349_942_898_145_321_76e-4,
+        3.479_331_075_960_211_675_70e-5,
+    ];
+    const Q: [f64; 5] = [
+        1.0,
+        -2.403_394_911_734_414_218_78,
+        2.020_945_760_233_505_694_71,
+        -6.882_839_716_054_532_930_30e-1,
+        7.703_815_055_590_193_527_91e-2,
+    ];
+    series(P, x2) / series(Q, x2)
+}
+
 /// The Φ of least length with exp(Φ̂) = R.
 #[inline]
 pub fn log(rotation: &Matrix3<f64>) -> Vector3<f64> {
@@ -152,10 +177,8 @@ pub fn log(rotation: &Matrix3<f64>) -> Vector3<f64> {
     let axial = Vector3::new(r[(2, 1)] - r[(1, 2)], r[(0, 2)] - r[(2, 0)], r[(1, 0)] - r[(0, 1)]) * 0.5; // Φ sin φ/φ
     let cos = 0.5 * (r.trace() - 1.0);
     let sin2 = axial.norm_squared();
-    if cos > 0.8 {
-        // φ/sin φ = asin(x)/x at x = sin φ ≤ 0.6: no cancellation, exact at 0
-        let x = sin2.sqrt();
-        return if x > 1e-4 { axial * (x.asin() / x) } else { axial * (1.0 + sin2 / 6.0) };
+    if cos > 0.0 && sin2 < ARC_SINE {
+        return axial * (1.0 + sin2 * arc_sine_rest(sin2));
     }
     if cos > -0.8 {
         let x = sin2.sqrt();
@@ -196,51 +219,90 @@ fn jacobian(phi: &Vector3<f64>, b: f64, d: f64) -> Matrix3<f64> {
     jacobian
 }
 
-/// What differentiating J_r(Φ) yields, at one Φ.
+/// J_r(Φ) and what differentiating it yields, at one Φ.
 #[derive(Clone, Copy, Debug)]
 pub struct Tangent {
     phi: Vector3<f64>,
-    /// b and d, each with its first and second derivative by φ².
-    b: [f64; 3],
-    d: [f64; 3],
+    /// b and d, each with its derivative by φ².
+    b: [f64; 2],
+    d: [f64; 2],
+}
+
+/// The coefficients in φ² of the `order`-th derivative by φ² of b (`first` = 2) or d (3), Σ (−φ²)ⁿ / (2n + first)!.
+const fn taylor(first: usize, order: usize) -> [f64; 7] {
+    let mut derivative = [0.0; 7];
+    let (mut n, mut term) = (0, 1.0 / if first == 2 { 2.0 } else { 6.0 });
+    while n < 7 + order {
+        if n >= order {
+            let x = n as f64;
+            let powers = [1.0, x, x * (x - 1.0)];
+            derivative[n - order] = powers[order] * term;
+        }
+        term /= -(((2 * n + first + 1) * (2 * n + first + 2)) as f64);
+        n += 1;
+    }
+    derivative
 }
 
 impl Tangent {
     /// At Φ.
     #[inline]
     pub fn new(phi: &Vector3<f64>) -> Self {
-        // coefficients of Σ (−φ²)ⁿ / (2n + first)! and of its derivatives
-        const fn taylor(first: usize) -> [[f64; 7]; 3] {
-            let mut all = [[0.0; 7]; 3];
-            let (mut n, mut term) = (0, 1.0 / if first == 2 { 2.0 } else { 6.0 });
-            while n < 9 {
-                let x = n as f64;
-                let derivatives = [term, x * term, x * (x - 1.0) * term];
-                let mut order = 0;
-                while order < 3 {
-                    if n >= order && n - order < 7 {
-                        all[order][n - order] = derivatives[order];
-                    }
-                    order += 1;
-                }
-                term /= -(((2 * n + first + 1) * (2 * n + first + 2)) as f64);
-                n += 1;
-            }
-            all
-        }
-        const B: [[f64; 7]; 3] = taylor(2);
-        const D: [[f64; 7]; 3] = taylor(3);
+        const B: [[f64; 7]; 2] = [taylor(2, 0), taylor(2, 1)];
+        const D: [[f64; 7]; 2] = [taylor(3, 0), taylor(3, 1)];
         let phi2 = phi.norm_squared();
         let (b, d) = if phi2 < SERIES {
             (B.map(|coefficients| series(coefficients, phi2)), D.map(|coefficients| series(coefficients, phi2)))
         } else {
             let (a, b, d) = exp_coefficients(phi2);
             let half = 0.5 / phi2;
-            let a_1 = (phi2.sqrt().cos() - a) * half;
-            let (b_1, d_1) = ((a - 2.0 * b) * half, (b - 3.0 * d) * half);
-            ([b, b_1, (a_1 - 4.0 * b_1) * half], [d, d_1, (b_1 - 5.0 * d_1) * half])
+            ([b, (a - 2.0 * b) * half], [d, (b - 3.0 * d) * half])
         };
         Self { phi: *phi, b, d }
+    }
+
+    /// The second derivatives of b and d by φ².
+    #[inline]
+    fn second(&self) -> (f64, f64) {
+        const B: [f64; 7] = taylor(2, 2);
+        const D: [f64; 7] = taylor(3, 2);
+        let phi2 = self.phi.norm_squared();
+        if phi2 < SERIES {
+            (series(B, phi2), series(D, phi2))
+        } else {
+            let ([b, b_1], [_, d_1]) = (self.b, self.d);
+            let half = 0.5 / phi2;
+            let a = 2.0 * (b + b_1 * phi2);
+            let a_1 = (phi2.sqrt().cos() - a) * half;
+            ((a_1 - 4.0 * b_1) * half, (b_1 - 5.0 * d_1) * half)
+        }
+    }
+
+    /// Φ.
+    #[inline]
+    pub fn log(&self) -> &Vector3<f64> {
+        &self.phi
+    }
+
+    /// J_r(Φ) x.
+    #[inline]
+    pub fn times(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.mapped(1.0, x)
+    }
+
+    /// J_rᵀ(Φ) x.
+    #[inline]
+    pub fn transposed_times(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        // J_rᵀ(Φ) = J_r(−Φ)
+        self.mapped(-1.0, x)
+    }
+
+    /// x − sign b Φ×x + d Φ×(Φ×x).
+    #[inline]
+    fn mapped(&self, sign: f64, x: &Vector3<f64>) -> Vector3<f64> {
+        let Self { phi, b: [b, _], d: [d, _] } = self;
+        let once = phi.cross(x);
+        x - once * (sign * b) + phi.cross(&once) * *d
     }
 
     /// J_r(Φ).
@@ -252,10 +314,17 @@ impl Tangent {
     /// J_r⁻¹(Φ) x, |Φ| < 2π.
     #[inline]
     pub fn inverse_times(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        let Self { phi, b: [b, b_1, _], .. } = self;
+        let Self { phi, b: [b, b_1], .. } = self;
         let once = phi.cross(x);
         // c = −b'/b
         x + once * 0.5 - phi.cross(&once) * (b_1 / b)
+    }
+
+    /// J_r⁻¹(Φ), |Φ| < 2π.
+    #[inline]
+    pub fn inverse(&self) -> Matrix3<f64> {
+        let Self { phi, b: [b, b_1], .. } = self;
+        jacobian(phi, -0.5, -b_1 / b)
     }
 
     /// ∂(J_r(Φ) x)/∂Φ.
@@ -264,17 +333,27 @@ impl Tangent {
         self.derivative(1.0, x)
     }
 
+    /// ∂(J_r(Φ) x)/∂Φ y.
+    #[inline]
+    pub fn by_log_times(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Vector3<f64> {
+        let Self { phi, b: [b, b_1], d: [d, d_1] } = self;
+        let (once, turned) = (phi.cross(x), y.cross(x));
+        let grown = 2.0 * phi.dot(y);
+        // of x − b Φ×x + d Φ×(Φ×x)
+        phi.cross(&once) * (d_1 * grown) - once * (b_1 * grown) - turned * *b
+            + (y.cross(&once) + phi.cross(&turned)) * *d
+    }
+
     /// ∂(J_rᵀ(Φ) x)/∂Φ.
     #[inline]
     pub fn transposed_by_log(&self, x: &Vector3<f64>) -> Matrix3<f64> {
-        // J_rᵀ(Φ) = J_r(−Φ)
         self.derivative(-1.0, x)
     }
 
     /// Of x − sign b Φ×x + d Φ×(Φ×x).
     #[inline]
     fn derivative(&self, sign: f64, x: &Vector3<f64>) -> Matrix3<f64> {
-        let Self { phi, b: [b, b_1, _], d: [d, d_1, _] } = self;
+        let Self { phi, b: [b, b_1], d: [d, d_1] } = self;
         let once = phi.cross(x);
         let along = phi.cross(&once) * (2.0 * d_1) - once * (2.0 * sign * b_1) - x * *d;
         let mut derivative = along * phi.transpose();
@@ -282,14 +361,29 @@ impl Tangent {
         derivative
     }
 
+    /// Φ · v and Φ · S Φ of x · J_r(Φ) y = x · y − b Φ · v + d Φ · S Φ, with v and S Φ.
+    #[inline]
+    fn form(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> (f64, f64, Vector3<f64>, Vector3<f64>) {
+        let phi = &self.phi;
+        let v = y.cross(x);
+        let turned = (y * phi.dot(x) + x * phi.dot(y)) * 0.5 - phi * x.dot(y);
+        (phi.dot(&v), phi.dot(&turned), v, turned)
+    }
+
+    /// ∂(x · J_r(Φ) y)/∂Φ.
+    #[inline]
+    pub fn gradient(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Vector3<f64> {
+        let Self { phi, b: [b, b_1], d: [d, d_1] } = self;
+        let (by_v, by_s, v, turned) = self.form(x, y);
+        turned * (2.0 * d) - v * *b + phi * (2.0 * (d_1 * by_s - b_1 * by_v))
+    }
+
     /// ∂²(x · J_r(Φ) y)/∂Φ².
     #[inline]
     pub fn hessian(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
-        let Self { phi, b: [_, b_1, b_2], d: [d, d_1, d_2] } = self;
-        // x · J_r(Φ) y = x · y − b Φ · v + d Φ · S Φ
-        let v = y.cross(x);
-        let turned = (y * phi.dot(x) + x * phi.dot(y)) * 0.5 - phi * x.dot(y);
-        let (by_v, by_s) = (phi.dot(&v), phi.dot(&turned));
+        let Self { phi, b: [_, b_1], d: [d, d_1] } = self;
+        let (b_2, d_2) = self.second();
+        let (by_v, by_s, v, turned) = self.form(x, y);
         let along = turned * (4.0 * d_1) - v * (2.0 * b_1) + phi * (2.0 * (d_2 * by_s - b_2 * by_v));
         let twice = |i: usize, j: usize| along[i] * phi[j] + along[j] * phi[i] + (x[i] * y[j] + x[j] * y[i]) * d;
         let same = 2.0 * (d_1 * by_s - b_1 * by_v - d * x.dot(y));
@@ -455,7 +549,12 @@ mod tests {
         for phi in vectors() {
             let tangent = Tangent::new(&phi);
             assert!((tangent.jacobian() - right_jacobian(&phi)).amax() < 1e-15);
+            assert!((tangent.times(&x) - right_jacobian(&phi) * x).norm() < 1e-14);
+            assert!((tangent.transposed_times(&x) - right_jacobian(&phi).tr_mul(&x)).norm() < 1e-14);
             assert!((tangent.inverse_times(&x) - inverse_right_jacobian(&phi) * x).norm() < 1e-14);
+            assert!((tangent.inverse() - inverse_right_jacobian(&phi)).amax() < 1e-14);
+            assert!((tangent.by_log_times(&x, &y) - tangent.by_log(&x) * y).norm() < 1e-14);
+            assert!((tangent.gradient(&x, &y) - tangent.by_log(&y).tr_mul(&x)).norm() < 1e-14);
             let difference = |f: &dyn Fn(&Vector3<f64>) -> Vector3<f64>| {
                 (f(&(phi + direction * eps)) - f(&(phi - direction * eps))) / (2.0 * eps)
             };

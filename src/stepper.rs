@@ -10,7 +10,7 @@ use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
 use crate::energy::Powers;
 use crate::mesh::Mesh;
-use crate::pose::{self, Known, Row, State, Time};
+use crate::pose::{self, Known, Row, Section, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta;
 use crate::so3;
@@ -24,12 +24,25 @@ const MAX_ITERATIONS: usize = 25;
 const MAX_RELAXED_ITERATIONS: usize = 60;
 /// The same in a stage of a step of order 4, which begins with a good guess or is better taken smaller.
 const MAX_STAGE_ITERATIONS: usize = 10;
+/// The same from a guess by which all goes on smoothly, which is given up for a nearer one.
+const MAX_SMOOTH_ITERATIONS: usize = 5;
 /// Largest rotation of a section in one iteration, rad: beyond it the linearisation of a rotation means little.
 const MAX_ROTATION: f64 = 0.7;
 /// Increment, scaled, after which Newton has converged: the next would be of the order of its square.
 const TOLERANCE: f64 = 1e-8;
 /// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
 const ROUNDINGS: f64 = 256.0;
+
+/// Part of what a stage need not resolve that its iteration may leave: the errors of many steps point one way and add up.
+const PART_LEFT: f64 = 1e-2;
+/// What no iteration of a stage need leave less than.
+const FINEST: f64 = 1e-13;
+/// Part of an increment of Newton's own that it leaves at most: what the Jacobian leaves out, or its square.
+const NEWTON_LEAVES: f64 = 1e-2;
+/// Iterations in which kept factors must be seen to lead there: beyond them new ones cost less.
+const SOON: i32 = 4;
+/// Part of the increment before that one with kept factors may have and still be taken.
+const WORST_RATE: f64 = 0.7;
 
 /// Turn of a section in a step up to which the step resolves the motion, rad: well below the angles (about 1 rad) where
 /// Newton on the accelerations of the rotations begins to fail and energy to grow.
@@ -127,6 +140,36 @@ struct Rates {
     kappa_t: Vector3<f64>,
 }
 
+/// n, m and a of a section, which follow from the motion and have no history.
+#[derive(Clone, Copy, Debug, Default)]
+struct Carried {
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+    acceleration: Vector3<f64>,
+}
+
+/// The factors that one stage of a step of order 4 leaves to the next.
+#[derive(Clone, Copy, PartialEq)]
+enum Factors {
+    /// There are none of this step.
+    Missing,
+    /// They serve.
+    Good,
+    /// The rod turns too much from stage to stage.
+    Poor,
+    /// Every iteration has its own, as a stage was lost with others.
+    Unused,
+}
+
+/// What a stage begins with, beyond what the stages before give of it.
+#[derive(Clone, Copy, PartialEq)]
+enum Guess {
+    /// All goes on through the last three stages.
+    Smooth,
+    /// The accelerations go on through the last two, n, m and a are those of the last: less near, and never far.
+    Near,
+}
+
 /// The largest increments of an iteration.
 struct Largest {
     turn: f64,
@@ -157,10 +200,18 @@ pub struct Stepper {
     pub state: State,
     old: State,
     trial: State,
+    /// The sections that a stage begins with.
+    guess: State,
+    /// Within the last step of order 4.
+    seen: State,
+    /// Its length, s.
+    span: f64,
     system: System,
     sweep: Sweep,
     /// The rates at the stages of a step of order 4, of everything that has a history.
     stages: Vec<[Rates; runge_kutta::STAGES]>,
+    /// What the sections carry there, of the nodes and then of the points.
+    carried: Vec<[Carried; runge_kutta::STAGES]>,
 }
 
 impl Stepper {
@@ -170,7 +221,21 @@ impl Stepper {
         let system = System::new(mesh.cells.len(), &mesh.rule, extensible);
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
         let stages = vec![Default::default(); state.memory.len()];
-        Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep, stages }
+        let carried = vec![Default::default(); state.nodes.len() + state.points.len()];
+        Self {
+            old: state.clone(),
+            trial: state.clone(),
+            guess: state.clone(),
+            seen: state.clone(),
+            span: 0.0,
+            state,
+            mesh,
+            rod,
+            system,
+            sweep,
+            stages,
+            carried,
+        }
     }
 
     /// The state before the last step.
@@ -285,19 +350,35 @@ impl Stepper {
     pub fn attempt(&mut self, drive: &impl Fn(f64) -> Boundary, h: f64, accuracy: f64) -> Result<Attempt, Diverged> {
         let weight = 1.0 / (runge_kutta::GAMMA * h);
         let time = Time::Stage { weight };
+        self.span = h;
         self.old.copy_from(&self.state);
         self.trial.copy_from(&self.state);
         let begin = drive(0.0);
         self.take_rates(0, weight);
         let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * runge_kutta::weight(0));
         let mut iterations = 0;
+        let mut factors = Factors::Missing;
         for i in 1..runge_kutta::STAGES {
             let boundary = drive(runge_kutta::C[i] * h);
-            self.prepare_stage(i, h, weight, &boundary);
-            iterations += self
-                .stage(&boundary, &time, accuracy)
-                .map_err(|diverged| Diverged { iterations: iterations + diverged.iterations, ..diverged })?;
-            self.trial.settle(&self.mesh, &self.rod, &self.old, &boundary, &time);
+            for guess in [Guess::Smooth, Guess::Near] {
+                self.prepare_stage(i, h, weight, &boundary, guess);
+                match self.stage(&boundary, &time, accuracy, &mut factors) {
+                    Ok(taken) => {
+                        iterations += taken;
+                        break;
+                    }
+                    Err(diverged) => {
+                        iterations += diverged.iterations;
+                        factors = Factors::Unused;
+                        if guess == Guess::Near {
+                            return Err(Diverged { iterations, ..diverged });
+                        }
+                    }
+                }
+            }
+            let last = i == runge_kutta::STAGES - 1;
+            let settle = if last { State::settle } else { State::settle_within };
+            settle(&mut self.trial, &self.mesh, &self.rod, &self.old, &boundary, &time);
             self.take_rates(i, weight);
             work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * runge_kutta::weight(i));
         }
@@ -318,13 +399,40 @@ impl Stepper {
         std::mem::swap(&mut self.state, &mut self.trial);
     }
 
+    /// The rod at the fraction 0 to 1 of the step of order 4 that was last attempted, under what acts then, consistent with
+    /// the equations of motion: positions and velocities to order 4, accelerations and with them n and m to order 3. Good
+    /// until the next step or equilibrium; nothing but what is returned has changed.
+    pub fn look(&mut self, fraction: f64, boundary: &Boundary) -> &State {
+        let Self { mesh, rod, old, stages, seen, span, .. } = self;
+        seen.copy_from(old);
+        for (m, rates) in stages.iter().enumerate() {
+            let (first, last) = (&rates[0], &rates[runge_kutta::STAGES - 1]);
+            let grown = |rate: fn(&Rates) -> Vector3<f64>| {
+                let sum = |sum, (j, rates)| sum + rate(rates) * (*span * runge_kutta::weight(j));
+                rates.iter().enumerate().fold(Vector3::zeros(), sum)
+            };
+            let begin = [Vector3::zeros(), first.theta_t, first.theta_tt];
+            let end = [grown(|rates| rates.theta_t), last.theta_t, last.theta_tt];
+            let turn = runge_kutta::between(&begin, &end, *span, fraction);
+            let strain = runge_kutta::slope_between(
+                &grown(|rates| rates.kappa_t),
+                [&first.kappa_t, &last.kappa_t],
+                *span,
+                fraction,
+            );
+            seen.turn_history(m, &old.remembering(m).rotation, turn, strain);
+        }
+        seen.balance(mesh, rod, boundary);
+        seen
+    }
+
     /// What the stages before stage `i` give of its coordinates, and a guess of it.
-    fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary) {
-        let Self { mesh, old, trial, stages, .. } = self;
-        // θ_tt goes on as between the two stages before
-        let c = &runge_kutta::C;
-        let last = i - 1;
-        let (before, on) = if i > 1 { (i - 2, (c[i] - c[last]) / (c[last] - c[i - 2])) } else { (0, 0.0) };
+    fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary, guess: Guess) {
+        let Self { mesh, old, trial, stages, carried, .. } = self;
+        let (on, carried_on) = match guess {
+            Guess::Smooth => (runge_kutta::onward(i, 3), runge_kutta::onward(i, 3)),
+            Guess::Near => (runge_kutta::onward(i, 2), runge_kutta::onward(i, 1)),
+        };
         for (m, rates) in stages.iter().enumerate() {
             let memory = &mut old.memory[m];
             let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
@@ -335,42 +443,102 @@ impl Stepper {
                 known.kappa += kappa_t * a;
             }
             memory.known = known;
-            let theta_tt = rates[last].theta_tt + (rates[last].theta_tt - rates[before].theta_tt) * on;
+            let theta_tt = (0..i).fold(Vector3::zeros(), |sum, j| sum + rates[j].theta_tt * on[j]);
             let theta = known.theta + (known.rate + theta_tt / weight) / weight;
             if let (Some(point), Some(begin)) = (trial.points.get_mut(m), old.points.get(m)) {
                 point.rotation = begin.rotation * so3::exp(&theta);
             }
         }
         trial.carry_nodes(mesh, &boundary.base.rotation);
+        for (section, carried) in trial.nodes.iter_mut().chain(&mut trial.points).zip(carried) {
+            let goes_on = |field: fn(&Carried) -> Vector3<f64>| {
+                (0..i).fold(Vector3::zeros(), |sum, j| sum + field(&carried[j]) * carried_on[j])
+            };
+            section.force = goes_on(|carried| carried.force);
+            section.moment = goes_on(|carried| carried.moment);
+            section.acceleration = goes_on(|carried| carried.acceleration);
+        }
     }
 
     /// Newton from the guess in `trial` to the stage, in `trial`.
-    fn stage(&mut self, boundary: &Boundary, time: &Time, accuracy: f64) -> Result<usize, Diverged> {
-        let Self { mesh, rod, system, sweep, old, trial, .. } = self;
+    ///
+    /// Factors are kept as long as they soon lead there: increments that fall by the rate q leave an error of q/(1 − q)
+    /// times the last. One that hardly falls is not taken; where the factors were another stage's, Newton then begins
+    /// anew from the guess.
+    fn stage(
+        &mut self,
+        boundary: &Boundary,
+        time: &Time,
+        accuracy: f64,
+        factors: &mut Factors,
+    ) -> Result<usize, Diverged> {
+        let Self { mesh, rod, system, sweep, old, trial, guess, .. } = self;
         let (scales, rounding) = scales(mesh, rod, old, boundary, time);
-        // an increment leaves an error of at most its tenth: what the Jacobian leaves out, or its square
-        let tolerance = (10.0 * accuracy).clamp(TOLERANCE, 1e-2);
-        let mut residual = f64::INFINITY;
-        for iteration in 1..=MAX_STAGE_ITERATIONS {
-            let diverged = |residual, reason| Diverged { iterations: iteration, residual, reason };
-            pose::assemble(mesh, rod, old, trial, boundary, time, system);
-            residual = system.residuals.largest(&scales);
-            sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
-            let largest = Largest::of(sweep);
-            if !(residual + largest.turn + largest.force + largest.moment).is_finite() {
-                return Err(diverged(residual, Reason::NotFinite));
-            }
-            trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / largest.turn).min(1.0), time.row());
-            if largest.turn < tolerance && largest.force < (tolerance * scales.force).max(ROUNDINGS * rounding) {
-                return Ok(iteration);
-            }
+        let target = (accuracy * PART_LEFT).clamp(FINEST, 1e-5);
+        let mut keep = *factors == Factors::Good;
+        let mut borrowed = keep;
+        if borrowed {
+            guess.copy_sections_from(trial);
         }
-        Err(Diverged { iterations: MAX_STAGE_ITERATIONS, residual, reason: Reason::TooManyIterations })
+        let mut before = f64::INFINITY;
+        let (mut iterations, mut factorised) = (0, 0);
+        loop {
+            iterations += 1;
+            let diverged = |system: &System, reason| {
+                Err(Diverged { iterations, residual: system.residuals.largest(&scales), reason })
+            };
+            if keep {
+                pose::assemble_residuals(mesh, rod, old, trial, boundary, time, system);
+                sweep.solve_for(&system.residuals);
+            } else {
+                factorised += 1;
+                pose::assemble(mesh, rod, old, trial, boundary, time, system);
+                if let Err(singular) = sweep.solve(system) {
+                    return diverged(system, Reason::Singular(singular));
+                }
+            }
+            let Largest { turn, force, moment } = Largest::of(sweep);
+            let size = larger(turn, if force < ROUNDINGS * rounding { 0.0 } else { force / scales.force });
+            // 0 where there was none before
+            let rate = size / before;
+            if keep && !(rate < WORST_RATE && (size + moment).is_finite()) {
+                keep = false;
+                if borrowed {
+                    (borrowed, *factors, before) = (false, Factors::Poor, f64::INFINITY);
+                    trial.copy_sections_from(guess);
+                }
+                continue;
+            }
+            if !(size + force + moment).is_finite() {
+                return diverged(system, Reason::NotFinite);
+            }
+            trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / turn).min(1.0), time.row());
+            let left = rate / (1.0 - rate) * size;
+            let seen = keep && before.is_finite();
+            if if seen { left <= target } else { !keep && size * NEWTON_LEAVES <= target } {
+                if *factors == Factors::Missing {
+                    *factors = Factors::Good;
+                }
+                return Ok(iterations);
+            }
+            if factorised == if *factors == Factors::Unused { MAX_STAGE_ITERATIONS } else { MAX_SMOOTH_ITERATIONS } {
+                return diverged(system, Reason::TooManyIterations);
+            }
+            let soon = !seen || left * rate.powi(SOON) <= target;
+            if borrowed && !soon {
+                *factors = Factors::Poor;
+            }
+            (keep, before) = (soon && *factors != Factors::Unused, size);
+        }
     }
 
     /// The rates of the coordinates at stage `i`, which is settled in `trial`.
     fn take_rates(&mut self, i: usize, weight: f64) {
-        let Self { old, trial, stages, .. } = self;
+        let Self { old, trial, stages, carried, .. } = self;
+        for (section, carried) in trial.nodes.iter().chain(&trial.points).zip(carried) {
+            let Section { force, moment, acceleration, .. } = *section;
+            carried[i] = Carried { force, moment, acceleration };
+        }
         for (m, rates) in stages.iter_mut().enumerate() {
             let memory = &trial.memory[m];
             rates[i] = if i == 0 {
@@ -484,7 +652,7 @@ impl Stepper {
             let share = f64::min(done + part, 1.0);
             let from = &begin.boundary;
             let between = |a: &Vector3<f64>, b: &Vector3<f64>| a * (1.0 - share) + b * share;
-            let moved = |from: &Support, section: &pose::Section, to: &Support| {
+            let moved = |from: &Support, section: &Section, to: &Support| {
                 // a support that held something else, or nothing, was not on its way to this one
                 let (r, R) = match from.held == to.held {
                     true => (&from.position, &from.rotation),
@@ -590,8 +758,7 @@ fn scales(mesh: &Mesh, rod: &Rod, old: &State, boundary: &Boundary, time: &Time)
     let length = mesh.length();
     let stiffness = rod.stiffness.amax();
     let finest = mesh.cells.iter().fold(f64::INFINITY, |h, cell| h.min(cell.length));
-    let carried =
-        |field: fn(&pose::Section) -> Vector3<f64>| old.nodes.iter().map(|n| field(n).amax()).fold(0.0, f64::max);
+    let carried = |field: fn(&Section) -> Vector3<f64>| old.nodes.iter().map(|n| field(n).amax()).fold(0.0, f64::max);
     let weight = (rod.mass_per_length * length + rod.tip_mass) * boundary.gravity.amax();
     let force = carried(|n| n.force) + boundary.tip_force.amax() + weight + 1e-3 * stiffness / (length * length);
     let moment = carried(|n| n.moment) + boundary.tip_moment.amax() + 1e-3 * (stiffness / length + weight * length);

@@ -13,13 +13,15 @@ use nalgebra::Vector3;
 /// A rod released from the horizontal, in the steps that the unit chooses.
 pub struct Automatic {
     unit: Unit,
+    /// What it shows after the last step.
+    nodes: Vec<Section>,
     iterations: i32,
 }
 
 impl Automatic {
     pub fn new(material: &Material, cells: usize, tolerance: f64) -> Result<Self, Error> {
-        let unit = Unit::new(&material.parameters(cells), &Inputs::default(), Some(tolerance))?;
-        Ok(Self { unit, iterations: 0 })
+        let mut unit = Unit::new(&material.parameters(cells), &Inputs::default(), Some(tolerance))?;
+        Ok(Self { nodes: unit.stepper().state.nodes.clone(), unit, iterations: 0 })
     }
 }
 
@@ -29,17 +31,18 @@ impl Formulation for Automatic {
             Error::Diverged { cause, .. } => cause,
             _ => Diverged { iterations: 0, residual: f64::INFINITY, reason: Reason::NotFinite },
         })?;
-        let before = std::mem::replace(&mut self.iterations, self.unit.outputs().iterations);
+        self.nodes.clone_from(&self.unit.stepper().state.nodes);
+        let before = std::mem::replace(&mut self.iterations, self.unit.outputs().solver.iterations);
         let iterations = (self.iterations - before) as usize;
         Ok(Report { iterations, residual: 0.0, termination: Termination::Newton })
     }
 
     fn nodes(&self) -> usize {
-        self.unit.stepper().nodes()
+        self.nodes.len()
     }
 
     fn section(&self, j: usize) -> Section {
-        self.unit.stepper().section(j)
+        self.nodes[j]
     }
 
     fn energy(&self, _: &Vector3<f64>) -> Energy {
