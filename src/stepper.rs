@@ -450,13 +450,15 @@ impl Stepper {
             }
         }
         trial.carry_nodes(mesh, &boundary.base.rotation);
+        let last = i.saturating_sub(3)..i;
         for (section, carried) in trial.nodes.iter_mut().chain(&mut trial.points).zip(carried) {
-            let goes_on = |field: fn(&Carried) -> Vector3<f64>| {
-                (0..i).fold(Vector3::zeros(), |sum, j| sum + field(&carried[j]) * carried_on[j])
-            };
-            section.force = goes_on(|carried| carried.force);
-            section.moment = goes_on(|carried| carried.moment);
-            section.acceleration = goes_on(|carried| carried.acceleration);
+            let mut on = Carried::default();
+            for (carried, weight) in carried[last.clone()].iter().zip(&carried_on[last.clone()]) {
+                on.force += carried.force * *weight;
+                on.moment += carried.moment * *weight;
+                on.acceleration += carried.acceleration * *weight;
+            }
+            (section.force, section.moment, section.acceleration) = (on.force, on.moment, on.acceleration);
         }
     }
 
