@@ -11,7 +11,7 @@
 //!
 //! ```text
 //! host =C=> fmi2 -> unit -> {path, modes, energy, stepper} -> pose -> sweep
-//!                       tests -> plane -> {rosenbrock, energy, pose}
+//!                       tests -> refine -> {plane, stepper},  plane -> {rosenbrock, energy, pose}
 //!         examples, tests -> rate -> formulation -> {energy, stepper}
 //!                       pose, rate -> {alpha, boundary, rod, mesh, so3},  stepper -> runge_kutta
 //! ```
@@ -22,7 +22,8 @@
 //! fails. The unit knows neither [`rate`] nor [`formulation`].
 //!
 //! A rod that stays in a plane has in [`plane`] a third way: an ordinary differential equation in its angles alone, on the
-//! same rods, meshes and ends, which [`rosenbrock`] integrates.
+//! same rods, meshes and ends, which [`rosenbrock`] integrates. The cells of either model refine and coarsen as [`refine`]
+//! sees fit.
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
@@ -65,6 +66,7 @@ pub mod pose;
 pub mod energy;
 pub mod plane;
 pub mod stepper;
+pub mod refine;
 pub mod formulation;
 pub mod rate;
 pub mod modes;

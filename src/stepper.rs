@@ -9,7 +9,7 @@
 use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
 use crate::energy::Powers;
-use crate::mesh::Mesh;
+use crate::mesh::{Cell, Mesh};
 use crate::pose::{self, Known, Row, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta;
@@ -171,6 +171,53 @@ impl Stepper {
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
         let stages = vec![Default::default(); state.memory.len()];
         Self { old: state.clone(), trial: state.clone(), state, mesh, rod, system, sweep, stages }
+    }
+
+    /// Makes room for `cells` cells, so that [`Self::resume`] and [`crate::refine`] allocate nothing up to so many.
+    pub fn reserve(&mut self, cells: usize) {
+        let count = self.mesh.cells.len();
+        let (most, stages) = (cells.max(count), self.mesh.rule.stages);
+        self.mesh.cells.reserve(most - count);
+        let Self { state, old, trial, .. } = self;
+        for state in [state, old, trial] {
+            state.nodes.reserve(most - count);
+            state.points.reserve((most - count) * stages);
+            state.memory.reserve((most - count) * stages);
+        }
+        self.resize(most);
+        self.resize(count);
+    }
+
+    /// Makes `state` on `mesh`, of the same rule, the present one.
+    pub fn resume(&mut self, mesh: &Mesh, state: &State) {
+        self.mesh.cells.clone_from(&mesh.cells);
+        self.state.copy_from(state);
+        self.resize(mesh.cells.len());
+    }
+
+    /// Makes room for a step on as many cells.
+    fn resize(&mut self, cells: usize) {
+        let Self { mesh, system, sweep, stages, .. } = self;
+        system.resize(cells, &mesh.rule);
+        sweep.resize(cells);
+        stages.resize(cells * mesh.rule.stages + 1, Default::default());
+    }
+
+    /// Exchanges the cells; the new mesh, the rod, the present state and the one on the new mesh, which is to be set.
+    pub(crate) fn remesh(&mut self, cells: &mut Vec<Cell>) -> (&Mesh, &Rod, &State, &mut State) {
+        self.old.copy_from(&self.state);
+        std::mem::swap(&mut self.mesh.cells, cells);
+        let count = self.mesh.cells.len();
+        self.state.resize(count, self.mesh.rule.stages);
+        self.resize(count);
+        (&self.mesh, &self.rod, &self.old, &mut self.state)
+    }
+
+    /// Takes the last exchange of cells back.
+    pub(crate) fn undo_remesh(&mut self, cells: &mut Vec<Cell>) {
+        std::mem::swap(&mut self.mesh.cells, cells);
+        self.state.copy_from(&self.old);
+        self.resize(self.mesh.cells.len());
     }
 
     /// The state before the last step.
