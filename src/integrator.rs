@@ -15,8 +15,10 @@ use crate::alpha::Scheme;
 use crate::boundary::{Boundary, Drive};
 use crate::energy::Energy;
 use crate::lateral::Disturbance;
+use crate::mesh::Mesh;
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
+use crate::refine::Refiner;
 use crate::rosenbrock::RODAS4;
 use crate::runge_kutta;
 use crate::stepper::{Attempt, Diverged, Stepper};
@@ -110,9 +112,11 @@ pub struct Effort {
     pub step: f64,
     /// Whether the last step was in a plane.
     pub planar: bool,
-    /// Sum of the estimated errors of the centreline, over the length; none are estimated where the length of the steps
-    /// is given.
+    /// Sum of the estimated errors of the steps, of the centreline over the length; none are estimated where the length of
+    /// the steps is given.
     pub error: f64,
+    /// The largest estimated error of the cells, of the tip over the length; none is where the cells are given.
+    pub space_error: f64,
 }
 
 /// The ends of the rod, world frame.
@@ -205,7 +209,7 @@ impl Planar {
     fn stays(&mut self) -> bool {
         let (time, _) = std::mem::take(&mut self.unwatched);
         if self.disturbance.size() < FADED {
-            self.disturbance.begin(&self.plane);
+            self.disturbance.begin(&self.plane, 1.0);
         }
         self.disturbance.advance(&self.plane, time) && self.disturbance.size() < GROWN
     }
@@ -239,15 +243,20 @@ pub struct Integrator {
     effort: Effort,
     before: Before,
     state_before: State,
+    mesh_before: Mesh,
+    /// What chooses the cells, now and before the interval.
+    refiners: Option<(Refiner, Refiner)>,
 }
 
 impl Integrator {
-    /// A rod that starts from the stepper's state under `boundary`. `step`, s, and `scheme` are those of generalized-α.
+    /// A rod that starts from the stepper's state under `boundary`. Its cells are as fine as the `refiner` wants them while
+    /// it moves accurately; without one they stay. `step`, s, and `scheme` are those of generalized-α.
     ///
     /// # Errors
     /// [`Diverged`] if the equations of motion at the start are singular.
     pub fn new(
         mut stepper: Stepper,
+        refiner: Option<Refiner>,
         way: Way,
         scheme: Scheme,
         step: f64,
@@ -266,16 +275,25 @@ impl Integrator {
             next: time * FIRST_STEP,
             shortest: shortest * step,
         };
+        let Mesh { cells, rule } = &stepper.mesh;
+        let (stages, refiner) = (rule.stages, refiner.filter(|_| matches!(way, Way::Accurate { .. })));
+        let most = refiner.as_ref().map_or(0, Refiner::most_cells).max(cells.len());
+        let mut state_before = stepper.state.clone();
+        state_before.reserve(most - cells.len(), stages);
+        let mut mesh_before = stepper.mesh.clone();
+        mesh_before.cells.reserve(most - cells.len());
+        stepper.reserve(most);
         let planar = planar.then(|| {
-            let plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
-            let disturbance = Disturbance::new(stepper.mesh.points());
+            let mut plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
+            plane.reserve(most);
+            let room = || Disturbance::new(most * stages);
             let (pace, unwatched) = (pace(PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
             Planar {
                 kept: plane.kept(),
-                before: (pace, disturbance.clone(), unwatched),
+                before: (pace, room(), unwatched),
                 plane,
                 pace,
-                disturbance,
+                disturbance: room(),
                 unwatched,
                 watch: TIME_UNWATCHED * time,
             }
@@ -295,7 +313,9 @@ impl Integrator {
             large: weight * length + stepper.rod.stiffness.max() / length,
             energy,
             effort,
-            state_before: stepper.state.clone(),
+            state_before,
+            mesh_before,
+            refiners: refiner.map(|refiner| (refiner.clone(), refiner)),
             stepper,
         })
     }
@@ -327,7 +347,13 @@ impl Integrator {
                 (*pace, *unwatched) = (planar.pace, planar.unwatched);
                 disturbance.copy_from(&planar.disturbance);
             }
-            _ => self.state_before.copy_from(&self.stepper.state),
+            _ => {
+                self.mesh_before.cells.clone_from(&self.stepper.mesh.cells);
+                self.state_before.copy_from(&self.stepper.state);
+            }
+        }
+        if let Some((now, before)) = &mut self.refiners {
+            before.copy_from(now);
         }
     }
 
@@ -341,7 +367,10 @@ impl Integrator {
                 (planar.pace, planar.unwatched) = (*pace, *unwatched);
                 planar.disturbance.copy_from(disturbance);
             }
-            _ => self.stepper.state.copy_from(&self.state_before),
+            _ => self.stepper.resume(&self.mesh_before, &self.state_before),
+        }
+        if let Some((now, before)) = &mut self.refiners {
+            now.copy_from(before);
         }
     }
 
@@ -384,20 +413,21 @@ impl Integrator {
         let holds = |plane: &Plane| plane.holds(&begin) && ahead.iter().all(|drive| plane.holds(drive));
         let mut entered = false;
         if self.in_plane && !holds(plane) {
-            plane.write(&mut self.stepper.state);
+            write(plane, &mut self.stepper);
             self.in_plane = false;
         }
         if !self.in_plane {
+            plane.take_mesh(&self.stepper.mesh.cells);
             entered = plane.enter(&self.stepper.state, &begin) && holds(plane);
             self.in_plane = entered;
             if entered {
-                disturbance.begin(plane);
+                disturbance.begin(plane, 1.0);
                 *unwatched = (0.0, 0);
             }
         }
         if self.in_plane && (entered || has_jumped(plane.drive(), &begin)) && plane.start(&begin).is_err() {
             if !entered {
-                plane.write(&mut self.stepper.state);
+                write(plane, &mut self.stepper);
             }
             self.in_plane = false;
         }
@@ -423,7 +453,7 @@ impl Integrator {
                 if dt > shortest {
                     continue;
                 }
-                planar.plane.write(&mut self.stepper.state);
+                write(&mut planar.plane, &mut self.stepper);
                 self.in_plane = false;
                 return time;
             }
@@ -442,9 +472,17 @@ impl Integrator {
             } else if due || last {
                 planar.plane.look(1.0, &at(dt));
             }
+            if let Some((refiner, _)) = &mut self.refiners {
+                let size = planar.disturbance.size();
+                // cells that cannot be started stay as they were
+                if refiner.adapt_plane(&mut planar.plane, &at(dt)) == Ok(true) {
+                    planar.disturbance.begin(&planar.plane, size);
+                }
+                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+            }
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
-                planar.plane.write(&mut self.stepper.state);
+                write(&mut planar.plane, &mut self.stepper);
                 planar.disturbance.disturb(&planar.plane, ROUNDINGS, &mut self.stepper.state);
                 self.in_plane = false;
                 break;
@@ -505,6 +543,11 @@ impl Integrator {
                 }
             }
             time = if dt == rest { duration } else { time + dt };
+            if let Some((refiner, _)) = &mut self.refiners {
+                // cells that cannot be started stay as they were
+                refiner.adapt(&mut self.stepper, &drive(time).boundary).ok();
+                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+            }
         }
         Ok(())
     }
@@ -598,6 +641,7 @@ impl Integrator {
     /// Fills `points` with the centreline at equal arc lengths from the base to the tip, m, world frame.
     pub fn centreline(&self, points: &mut [Vec3]) {
         let Stepper { mesh, rod, state, .. } = &self.stepper;
+        let mesh = self.plane().map_or(mesh, Plane::mesh);
         let parts = (points.len() - 1).max(1) as f64;
         let (mut cell, mut start) = (0, 0.0);
         for (i, point) in points.iter_mut().enumerate() {
@@ -630,7 +674,7 @@ impl Integrator {
 
     /// The cells along the rod.
     pub fn cells(&self) -> usize {
-        self.stepper.mesh.cells.len()
+        self.plane().map_or(&self.stepper.mesh, Plane::mesh).cells.len()
     }
 
     /// Arc length of the rod, m.
@@ -641,10 +685,16 @@ impl Integrator {
     /// The rod in space at present, wherever it is.
     pub fn in_space(&mut self) -> &mut Stepper {
         if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
-            plane.write(&mut self.stepper.state);
+            write(plane, &mut self.stepper);
         }
         &mut self.stepper
     }
+}
+
+/// Makes the rod in a plane that of `stepper`.
+fn write(plane: &mut Plane, stepper: &mut Stepper) {
+    stepper.take_mesh(&plane.mesh().cells);
+    plane.write(&mut stepper.state);
 }
 
 /// Whether loads or accelerations of the base are not those that the rod's accelerations belong to.

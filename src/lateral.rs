@@ -74,16 +74,17 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Room for that of a rod with so many Gauss points; [`Self::begin`] comes next.
+    /// Room for that of a rod with so many Gauss points at most; [`Self::begin`] comes next.
     pub fn new(points: usize) -> Self {
-        let (points, pivots) = (vec![Motion::default(); points], vec![Pivot::default(); points]);
-        Self { points, tip: Motion::default(), pivots }
+        Self { points: Vec::with_capacity(points), tip: Motion::default(), pivots: Vec::with_capacity(points) }
     }
 
-    /// Begins anew, at rest, on the rod where `plane` looks at: with turns that grow from the base to 1 rad at the tip.
-    pub fn begin(&mut self, plane: &Plane) {
+    /// Begins anew, at rest, on the rod where `plane` looks at: with turns that grow from the base to `size` at the tip.
+    pub fn begin(&mut self, plane: &Plane, size: f64) {
         let at = |w: f64, turn: f64| Motion { value: Vec3::new(w, turn, turn), ..Motion::default() };
-        let grown = FRAC_1_SQRT_2 / plane.slices().map(|slice| slice.length).sum::<f64>();
+        self.points.resize(plane.slices().len(), Motion::default());
+        self.pivots.resize(plane.slices().len(), Pivot::default());
+        let grown = size * FRAC_1_SQRT_2 / plane.slices().map(|slice| slice.length).sum::<f64>();
         let (mut w, mut arc) = (0.0, 0.0);
         for (slice, point) in plane.slices().zip(&mut self.points) {
             let Slice { length, tangent: [cos, sin], .. } = slice;
@@ -92,12 +93,13 @@ impl Disturbance {
             *point = at(w + half, grown * arc);
             (w, arc) = (w + 2.0 * half, arc + 0.5 * length);
         }
-        self.tip = at(w, FRAC_1_SQRT_2);
+        self.tip = at(w, size * FRAC_1_SQRT_2);
     }
 
-    /// Copies without allocating.
+    /// Copies, without allocating where there is room for as many points.
     pub fn copy_from(&mut self, other: &Self) {
-        self.points.copy_from_slice(&other.points);
+        self.points.clone_from(&other.points);
+        self.pivots.resize(other.points.len(), Pivot::default());
         self.tip = other.tip;
     }
 

@@ -10,7 +10,7 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> unit -> {path, modes, integrator},  integrator -> {stepper, plane, energy}
+//! host =C=> fmi2 -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
 //!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
 //!      examples, tests -> rate -> formulation -> {energy, stepper}
 //!                       pose, rate -> {alpha, boundary, rod, mesh, so3}
@@ -22,7 +22,8 @@
 //! fails. The integrator and the unit know neither [`rate`] nor [`formulation`].
 //!
 //! A rod that stays in a plane has in [`plane`] a third way: an ordinary differential equation in its angles alone, on the
-//! same rods, meshes and ends, which [`rosenbrock`] integrates; [`lateral`] tells whether it would stay there. [`integrator`] chooses between that and the rod in space.
+//! same rods, meshes and ends, which [`rosenbrock`] integrates; [`lateral`] tells whether it would stay there. The cells of
+//! either model refine and coarsen as [`refine`] sees fit. [`integrator`] brings all this together.
 //!
 //! 1. A module uses only modules listed before it (kept by `tests/layers.rs`).
 //! 2. Below `fmi2` nobody knows value references, C types, logging or files. Delete `fmi2`, `package` and the command
@@ -66,6 +67,7 @@ pub mod energy;
 pub mod plane;
 pub mod lateral;
 pub mod stepper;
+pub mod refine;
 pub mod formulation;
 pub mod rate;
 pub mod modes;

@@ -72,6 +72,106 @@ impl Gauss {
         }
         weights
     }
+
+    /// Weights of the values at the points in that at `theta` of the polynomial through them.
+    pub fn through(&self, theta: f64) -> [f64; MAX_STAGES] {
+        let others = |k: usize| (0..self.stages).filter(move |&j| j != k);
+        std::array::from_fn(|k| match k < self.stages {
+            true => others(k).map(|j| (theta - self.c[j]) / (self.c[k] - self.c[j])).product(),
+            false => 0.0,
+        })
+    }
+
+    /// What a polynomial that vanishes at the points and is 1 at 0 is at `theta`.
+    pub fn beside(&self, theta: f64) -> f64 {
+        self.c[..self.stages].iter().map(|c| 1.0 - theta / c).product()
+    }
+
+    /// The squares of the Legendre coefficients of degrees 0 and 1, and of degrees 2 and 3, of the polynomial with these
+    /// values at the points, summed up by pairs.
+    pub fn coefficients(&self, values: &[f64; MAX_STAGES]) -> [f64; 2] {
+        let square = |n: usize| {
+            let terms = (0..self.stages).map(|k| self.b[k] * legendre(n, 2.0 * self.c[k] - 1.0) * values[k]);
+            if n < self.stages { ((2 * n + 1) as f64 * terms.sum::<f64>()).powi(2) } else { 0.0 }
+        };
+        [square(0) + square(1), square(2) + square(3)]
+    }
+
+    /// The error of the rule for a function of length 1, over its derivative of order 2s.
+    pub fn remainder(&self) -> f64 {
+        let s = self.stages;
+        // (s!)⁴ / ((2s + 1) ((2s)!)³)
+        let factorials = (1..=s).map(|k| (k as f64).powi(4)).product::<f64>();
+        factorials / ((2 * s + 1) as f64 * (1..=2 * s).map(|k| (k as f64).powi(3)).product::<f64>())
+    }
+}
+
+/// Values at the points of a cell from those of a function at the points of its two halves: its mean square best
+/// approximation by a polynomial of degree s − 1. It keeps the integral, and s − 1 moments more.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joining {
+    /// By half, point of the cell, point of the half.
+    pub weights: [[[f64; MAX_STAGES]; MAX_STAGES]; 2],
+}
+
+impl Joining {
+    /// For cells of a rule.
+    pub fn new(rule: &Gauss) -> Self {
+        let weight = |half: usize, k: usize, l: usize| {
+            let (at, from) = (2.0 * rule.c[k] - 1.0, rule.c[l] + half as f64 - 1.0);
+            let degrees = 0..rule.stages;
+            degrees.map(|n| (n as f64 + 0.5) * legendre(n, at) * legendre(n, from)).sum::<f64>() * rule.b[l]
+        };
+        let within = |half, k: usize, l: usize| if k.max(l) < rule.stages { weight(half, k, l) } else { 0.0 };
+        Self {
+            weights: std::array::from_fn(|half| std::array::from_fn(|k| std::array::from_fn(|l| within(half, k, l)))),
+        }
+    }
+}
+
+/// P_n on [−1, 1].
+fn legendre(n: usize, x: f64) -> f64 {
+    let (mut before, mut last) = (0.0, 1.0);
+    for k in 0..n {
+        (before, last) = (last, ((2 * k + 1) as f64 * x * last - k as f64 * before) / (k + 1) as f64);
+    }
+    last
+}
+
+/// Where a cell of a new mesh lies in the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// It is the cell with this index.
+    Same(usize),
+    /// The half of a cell next to the base.
+    First(usize),
+    /// The other half.
+    Second(usize),
+    /// This cell and the next, of equal length and rest curvature.
+    Pair(usize),
+}
+
+impl Origin {
+    /// The cell of the mesh before, and the fraction of it, at the fraction `theta` of this one.
+    pub fn at(self, theta: f64) -> (usize, f64) {
+        match self {
+            Self::Same(cell) => (cell, theta),
+            Self::First(cell) => (cell, 0.5 * theta),
+            Self::Second(cell) => (cell, 0.5 + 0.5 * theta),
+            Self::Pair(cell) if theta <= 0.5 => (cell, 2.0 * theta),
+            Self::Pair(cell) => (cell + 1, 2.0 * theta - 1.0),
+        }
+    }
+
+    /// The cell itself, from those of the mesh before.
+    pub fn cell(self, before: &[Cell]) -> Cell {
+        let of = |cell: usize, part: f64| Cell { length: before[cell].length * part, ..before[cell] };
+        match self {
+            Self::Same(cell) => of(cell, 1.0),
+            Self::First(cell) | Self::Second(cell) => of(cell, 0.5),
+            Self::Pair(cell) => of(cell, 2.0),
+        }
+    }
 }
 
 /// One cell: its length and the curvature of the unstressed rod in it.

@@ -30,7 +30,7 @@
 use crate::alpha::Motion;
 use crate::boundary::{Boundary, Drive, Held, Support};
 use crate::energy::{Energy, Powers};
-use crate::mesh::{Gauss, MAX_STAGES, Mesh};
+use crate::mesh::{self, Gauss, Joining, MAX_STAGES, Mesh, Origin};
 use crate::pose::{self, State};
 use crate::rod::Rod;
 use crate::rosenbrock::Rosenbrock;
@@ -372,11 +372,40 @@ struct Node {
 /// A rod in a plane at an instant, as [`Plane::keep`] leaves it.
 #[derive(Clone, Debug)]
 pub struct Kept {
+    cells: Vec<mesh::Cell>,
     points: Vec<Points>,
     frame: Frame,
     section: Section,
     ends: Ends,
     drive: Drive,
+}
+
+/// How a cell is bent, as [`crate::refine`] wants to know it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bending {
+    /// What the curvature of the law misses at the first node, by the balance of moments, 1/m.
+    pub(crate) missed: f64,
+    /// As [`Gauss::coefficients`] has them, of κ − κ̂ of the law, 1/m².
+    pub(crate) coefficients: [f64; 2],
+    /// Largest |κ − κ̂| of the law at the points, and of the balance at the nodes, 1/m.
+    pub(crate) at_points: f64,
+    pub(crate) at_nodes: f64,
+    /// Largest |κ|, 1/m.
+    pub(crate) curvature: f64,
+    /// Largest |n|, N.
+    pub(crate) force: f64,
+    /// Distance of the tip, m.
+    pub(crate) lever: f64,
+    /// From end to end, rad.
+    pub(crate) turn: f64,
+}
+
+impl Bending {
+    /// What is missed, as far as it is not more than what there is: at a release moments are balanced that have not bent
+    /// the rod yet.
+    fn missed(&self) -> f64 {
+        self.missed.clamp(-self.at_points, self.at_points)
+    }
 }
 
 /// A rod in a plane with the storage to move it; after its construction nothing is allocated.
@@ -417,7 +446,7 @@ fn section_in(mesh: &Mesh, rod: &Rod, base: &Mat3, normal: &Vec3) -> Option<Sect
         let value = along.dot(&axis);
         ((along - axis * value).amax() <= ROUNDING * value.abs()).then_some(value)
     };
-    let curved = |cell: &crate::mesh::Cell| is_parallel(&cell.kappa_rest, &axis, 1.0 / mesh.length());
+    let curved = |cell: &mesh::Cell| is_parallel(&cell.kappa_rest, &axis, 1.0 / mesh.length());
     let in_plane = axis.z.abs() <= ROUNDING && mesh.cells.iter().all(curved) && !rod.is_extensible();
     let stiffness = principal(&rod.stiffness)?;
     let viscosity = principal(&rod.stiffness.component_mul(&rod.damping))?;
@@ -550,6 +579,134 @@ impl Plane {
     pub fn of(mesh: &Mesh, rod: &Rod, drive: &Drive, method: &'static Rosenbrock) -> Option<Self> {
         let mut plane = Self::new(mesh, rod, method);
         plane.enter(&State::at_rest_shape(mesh, &drive.boundary.base), drive).then_some(plane)
+    }
+
+    /// Makes room for `cells` cells, so that [`crate::refine`] allocates nothing up to so many.
+    pub fn reserve(&mut self, cells: usize) {
+        let count = self.cells.len();
+        let most = cells.max(count);
+        self.mesh.cells.reserve(most - count);
+        self.now.reserve(most - count);
+        self.next.reserve(most - count);
+        self.resize(most);
+        self.resize(count);
+    }
+
+    /// Makes room for as many cells, in all but the mesh and the points of the present and the next instant.
+    fn resize(&mut self, cells: usize) {
+        self.cells.resize(cells, Cell { length: 0.0, rest: 0.0 });
+        self.before.resize(cells, Points::default());
+        self.look_points.resize(cells, Points::default());
+        self.increments.resize(cells * self.method.stages, Points::default());
+        self.starts.resize(cells, Start::default());
+        self.stages.resize(cells, Stage::default());
+        self.fields.resize(cells, Field::default());
+    }
+
+    /// Takes these cells in place of its own, for [`Self::enter`] or points of its own to follow.
+    pub fn take_mesh(&mut self, cells: &[mesh::Cell]) {
+        self.mesh.cells.clear();
+        self.mesh.cells.extend_from_slice(cells);
+        self.now.resize(cells.len(), Points::default());
+        self.next.resize(cells.len(), Points::default());
+        self.resize(cells.len());
+        for (cell, given) in self.cells.iter_mut().zip(cells) {
+            cell.length = given.length;
+        }
+    }
+
+    /// The cells.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// Exchanges the cells for those with these origins in them, and solves for the accelerations as [`Self::start`]. At
+    /// the points of the new cells the curvature is what the balance of moments asks for, and its rate what it was.
+    ///
+    /// # Errors
+    /// [`Singular`] as of [`Self::start`]; the rod is as before.
+    pub(crate) fn remesh(
+        &mut self,
+        cells: &mut Vec<mesh::Cell>,
+        origins: &[Origin],
+        joining: &Joining,
+        drive: &Drive,
+    ) -> Result<(), Singular> {
+        self.look(1.0, drive);
+        let [mut angle, mut rate, _] = self.fields[0].node.angle;
+        self.next.clear();
+        for (origin, cell) in origins.iter().zip(cells.iter()) {
+            let mut strain = [Lane::default(); 2];
+            match *origin {
+                Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
+                Origin::First(old) | Origin::Second(old) => {
+                    let missed = self.bending(old).missed();
+                    for k in 0..self.mesh.rule.stages {
+                        let (_, theta) = origin.at(self.mesh.rule.c[k]);
+                        let through = self.mesh.rule.through(theta);
+                        let [g, g_t, _] = &self.fields[old].strain;
+                        strain[0][k] = total(&through, g) + self.mesh.rule.beside(theta) * missed;
+                        strain[1][k] = total(&through, g_t);
+                    }
+                }
+                Origin::Pair(old) => {
+                    for (half, weights) in joining.weights.iter().enumerate() {
+                        for (q, strain) in strain.iter_mut().enumerate() {
+                            let g = &self.fields[old + half].strain[q];
+                            *strain = lane(|k| strain[k] + total(&weights[k], g));
+                        }
+                    }
+                }
+            }
+            let [turn, turn_t] =
+                strain.map(|g| spread::<MAX_STAGES>(&self.rule.forward, &g).map(|sum| cell.length * sum));
+            let shifted = |by: f64, turn: Lane| lane(|k| if k < self.mesh.rule.stages { by + turn[k] } else { 0.0 });
+            self.next.push([shifted(angle, turn), shifted(rate, turn_t), Lane::default()]);
+            angle += cell.length * total(&self.rule.b, &strain[0]);
+            rate += cell.length * total(&self.rule.b, &strain[1]);
+        }
+        self.exchange(cells);
+        let started = self.start(drive);
+        if started.is_err() {
+            self.exchange(cells);
+            self.stand(drive);
+        }
+        self.next.resize(self.cells.len(), Points::default());
+        started
+    }
+
+    /// Exchanges the cells and the points on them.
+    fn exchange(&mut self, cells: &mut Vec<mesh::Cell>) {
+        std::mem::swap(&mut self.mesh.cells, cells);
+        std::mem::swap(&mut self.now, &mut self.next);
+        self.resize(self.mesh.cells.len());
+        for (cell, given) in self.cells.iter_mut().zip(&self.mesh.cells) {
+            *cell = Cell { length: given.length, rest: given.kappa_rest.dot(&self.frame.axis) };
+        }
+    }
+
+    /// How a cell is bent at the instant last looked at.
+    pub(crate) fn bending(&self, cell: usize) -> Bending {
+        let (field, next) = (&self.fields[cell], self.fields.get(cell + 1).map_or(&self.tip, |field| &field.node));
+        let per_stiffness = 1.0 / self.section.stiffness;
+        let size = |[x, y]: [f64; 2]| f64::hypot(x, y);
+        let points = field.moment.map(|m| m * per_stiffness);
+        let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        Bending {
+            missed: field.node.moment * per_stiffness - total(&self.mesh.rule.through(0.0), &points),
+            coefficients: self.mesh.rule.coefficients(&points),
+            at_points: largest(&points),
+            at_nodes: largest(&[field.node.moment, next.moment]) * per_stiffness,
+            curvature: largest(&field.strain[0]),
+            force: size(field.node.force).max(size(next.force)),
+            lever: size(from_fn(|i| self.tip.position[i] - field.node.position[i])),
+            turn: (next.angle[0] - field.node.angle[0]).abs(),
+        }
+    }
+
+    /// EI about the normal of the plane.
+    pub(crate) fn stiffness(&self) -> f64 {
+        self.section.stiffness
     }
 
     /// Whether what acts on the rod leaves it in its plane, clamped at the base and free at the tip.
@@ -1285,20 +1442,25 @@ impl Plane {
 
     /// The present, to be kept in the same place again and again.
     pub fn kept(&self) -> Kept {
-        let Self { now, frame, section, ends, drive, .. } = self;
-        Kept { points: now.clone(), frame: *frame, section: *section, ends: *ends, drive: *drive }
+        let Self { mesh, now, frame, section, ends, drive, .. } = self;
+        let (mut cells, mut points) = (Vec::with_capacity(mesh.cells.capacity()), Vec::with_capacity(now.capacity()));
+        cells.clone_from(&mesh.cells);
+        points.clone_from(now);
+        Kept { cells, points, frame: *frame, section: *section, ends: *ends, drive: *drive }
     }
 
     /// Copies the present into `kept`, from where [`Self::restore`] takes it.
     pub fn keep(&self, kept: &mut Kept) {
-        kept.points.copy_from_slice(&self.now);
+        kept.cells.clone_from(&self.mesh.cells);
+        kept.points.clone_from(&self.now);
         (kept.frame, kept.section, kept.ends, kept.drive) = (self.frame, self.section, self.ends, self.drive);
     }
 
     /// Makes what was kept the present again.
     pub fn restore(&mut self, kept: &Kept) {
+        self.take_mesh(&kept.cells);
         self.stand_in(kept.frame, kept.section);
-        self.now.copy_from_slice(&kept.points);
+        self.now.clone_from(&kept.points);
         self.ends = kept.ends;
         self.stand(&kept.drive);
     }

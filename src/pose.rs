@@ -364,7 +364,7 @@ impl State {
     }
 
     /// Integrates r_s along the rod from the base, which is where it is in the directions that are not held.
-    fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
+    pub(crate) fn rebuild_positions(&mut self, mesh: &Mesh, rod: &Rod) {
         let Support { position, rotation: R_s, held, .. } = self.boundary.base;
         let free = Mat3::from_diagonal(&Vec3::from_fn(|i, _| f64::from(!held.translation[i])));
         let away = R_s.tr_mul(&(self.nodes[0].position - position));
@@ -424,10 +424,24 @@ impl State {
         }
     }
 
-    /// Copies without allocating.
+    /// Makes room for `cells` cells more.
+    pub(crate) fn reserve(&mut self, cells: usize, stages: usize) {
+        self.nodes.reserve(cells);
+        self.points.reserve(cells * stages);
+        self.memory.reserve(cells * stages);
+    }
+
+    /// Makes it a state on as many cells, which is to be set.
+    pub(crate) fn resize(&mut self, cells: usize, stages: usize) {
+        self.nodes.resize(cells + 1, Section::default());
+        self.points.resize(cells * stages, Section::default());
+        self.memory.resize(cells * stages + 1, Memory::default());
+    }
+
+    /// Copies, without allocating where there is room for as many cells.
     pub fn copy_from(&mut self, other: &Self) {
         self.copy_sections_from(other);
-        self.memory.copy_from_slice(&other.memory);
+        self.memory.clone_from(&other.memory);
         self.boundary = other.boundary;
         self.dt = other.dt;
         self.scheme = other.scheme;
@@ -436,8 +450,8 @@ impl State {
 
     /// The sections alone.
     pub(crate) fn copy_sections_from(&mut self, other: &Self) {
-        self.nodes.copy_from_slice(&other.nodes);
-        self.points.copy_from_slice(&other.points);
+        self.nodes.clone_from(&other.nodes);
+        self.points.clone_from(&other.points);
     }
 
     /// Applies μ times the increments of a sweep.
@@ -652,7 +666,7 @@ impl State {
     }
 
     /// Integrates u_s = R (ω × e₃) along the rod from the base.
-    fn rebuild_velocities(&mut self, mesh: &Mesh) {
+    pub(crate) fn rebuild_velocities(&mut self, mesh: &Mesh) {
         let Gauss { stages, a, b, .. } = &mesh.rule;
         let mut start = self.boundary.base.velocity;
         for (j, cell) in mesh.cells.iter().enumerate() {

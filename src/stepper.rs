@@ -9,7 +9,7 @@
 use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
 use crate::energy::Powers;
-use crate::mesh::Mesh;
+use crate::mesh::{Cell, Mesh};
 use crate::pose::{self, Known, Row, Section, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta;
@@ -236,6 +236,60 @@ impl Stepper {
             stages,
             carried,
         }
+    }
+
+    /// Makes room for `cells` cells, so that [`Self::resume`] and [`crate::refine`] allocate nothing up to so many.
+    pub fn reserve(&mut self, cells: usize) {
+        let count = self.mesh.cells.len();
+        let (most, stages) = (cells.max(count), self.mesh.rule.stages);
+        self.mesh.cells.reserve(most - count);
+        let Self { state, old, trial, guess, seen, .. } = self;
+        for state in [state, old, trial, guess, seen] {
+            state.reserve(most - count, stages);
+        }
+        self.resize(most);
+        self.resize(count);
+    }
+
+    /// Makes `state` on `mesh`, of the same rule, the present one.
+    pub fn resume(&mut self, mesh: &Mesh, state: &State) {
+        self.take_mesh(&mesh.cells);
+        self.state.copy_from(state);
+    }
+
+    /// Takes these cells in place of its own; the present state is to be set.
+    pub(crate) fn take_mesh(&mut self, cells: &[Cell]) {
+        self.mesh.cells.clear();
+        self.mesh.cells.extend_from_slice(cells);
+        self.state.resize(cells.len(), self.mesh.rule.stages);
+        self.resize(cells.len());
+    }
+
+    /// Makes room for a step on as many cells.
+    fn resize(&mut self, cells: usize) {
+        let Self { mesh, system, sweep, stages, carried, .. } = self;
+        let points = cells * mesh.rule.stages;
+        system.resize(cells, &mesh.rule);
+        sweep.resize(cells);
+        stages.resize(points + 1, Default::default());
+        carried.resize(points + cells + 1, Default::default());
+    }
+
+    /// Exchanges the cells; the new mesh, the rod, the present state and the one on the new mesh, which is to be set.
+    pub(crate) fn remesh(&mut self, cells: &mut Vec<Cell>) -> (&Mesh, &Rod, &State, &mut State) {
+        self.old.copy_from(&self.state);
+        std::mem::swap(&mut self.mesh.cells, cells);
+        let count = self.mesh.cells.len();
+        self.state.resize(count, self.mesh.rule.stages);
+        self.resize(count);
+        (&self.mesh, &self.rod, &self.old, &mut self.state)
+    }
+
+    /// Takes the last exchange of cells back.
+    pub(crate) fn undo_remesh(&mut self, cells: &mut Vec<Cell>) {
+        std::mem::swap(&mut self.mesh.cells, cells);
+        self.state.copy_from(&self.old);
+        self.resize(self.mesh.cells.len());
     }
 
     /// The state before the last step.

@@ -348,6 +348,12 @@ impl<const V: usize, const S: usize> Residuals<V, S> {
         }
     }
 
+    /// Makes it that of as many cells, whose residuals are to be set.
+    pub fn resize(&mut self, cells: usize, rule: &Gauss) {
+        self.points.resize(cells * rule.stages, PointResiduals::default());
+        self.cells.resize(cells, EndResiduals::default());
+    }
+
     /// The largest, scaled.
     pub fn largest(&self, scales: &Scales) -> f64 {
         let size = |w: &SVector<f64, V>, log: &SVector<f64, S>, n: &SVector<f64, V>, m: &SVector<f64, S>| {
@@ -375,6 +381,13 @@ impl<const V: usize, const S: usize> System<V, S> {
             tip_joint: None,
             residuals: Residuals::new(cells, rule),
         }
+    }
+
+    /// Makes it a system of as many cells, which are to be set.
+    pub fn resize(&mut self, cells: usize, rule: &Gauss) {
+        self.points.resize(cells * rule.stages, Point::default());
+        self.cells.resize(cells, CellEnds::default());
+        self.residuals.resize(cells, rule);
     }
 }
 
@@ -699,6 +712,20 @@ impl<const V: usize, const S: usize> Sweep<V, S> {
             nodes: vec![Increment::default(); cells + 1],
             points: vec![Increment::default(); cells * rule.stages],
         }
+    }
+
+    /// Makes it the storage for as many cells, to be factorised.
+    pub fn resize(&mut self, cells: usize) {
+        let (unknowns, blocks, factors) = sizes::<V, S>(self.rule.stages, self.extensible);
+        self.cells.resize(cells, CellEnds::default());
+        self.blocks.resize(cells * blocks, 0.0);
+        self.factors.resize(cells * factors, 0.0);
+        self.order.resize(cells * unknowns, 0);
+        self.relations.resize(cells + 1, Relation::default());
+        self.loads.resize(cells + 1, zero());
+        self.constants.resize(cells * unknowns, 0.0);
+        self.nodes.resize(cells + 1, Increment::default());
+        self.points.resize(cells * self.rule.stages, Increment::default());
     }
 
     /// Solves `system`; the increments are in [`Sweep::nodes`] and [`Sweep::points`].

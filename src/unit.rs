@@ -11,6 +11,7 @@ use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
 use crate::pose::State;
+use crate::refine::Refiner;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
@@ -408,34 +409,39 @@ impl Parameters {
         }
     }
 
-    /// The cells: as given, or as many of four Gauss points as the bending length under the weight, the rest curvature
-    /// and the tolerance ask for.
+    /// The cells to begin with, and what refines them where they are not given.
     ///
     /// # Errors
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
-    fn mesh(&self, rod: &Rod, inputs: &Inputs, tolerance: f64) -> Result<Mesh, Error> {
+    fn mesh(&self, rod: &Rod, inputs: &Inputs, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
         let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
         let turn = self.rest_curvature.norm() * self.length;
-        let cells = if self.cells > 0 {
-            self.cells as usize
-        } else {
-            // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five
-            // cells of four points are right to 3e-4
-            let load = rod.mass_per_length * self.gravity.norm()
-                + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
-            let softest = rod.stiffness.min();
-            let bends = self.length * (load / softest).cbrt();
-            let wound = turn + inputs.tip_moment.norm() * self.length / softest;
-            let order = 2.0 * stages as f64;
-            let cells = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
-            cells.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS) as usize
-        };
-        if turn >= MAX_CELL_TURN * cells as f64 {
-            let name = "cells";
-            let allowed = Allowed::Such("as many that the rest curvature turns less than 3 rad in each");
-            return Err(Error::NotAllowed { name, value: cells as f64, allowed });
+        let uniform = |cells: usize| Mesh::uniform(self.length, cells, stages, self.rest_curvature);
+        if self.cells > 0 {
+            if turn >= MAX_CELL_TURN * f64::from(self.cells) {
+                let allowed = Allowed::Such("as many that the rest curvature turns less than 3 rad in each");
+                return Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
+            }
+            return Ok((uniform(self.cells as usize), None));
         }
-        Ok(Mesh::uniform(self.length, cells, stages, self.rest_curvature))
+        // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five cells of
+        // four points are right to 3e-4
+        let load = rod.mass_per_length * self.gravity.norm()
+            + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
+        let softest = rod.stiffness.min();
+        let bends = self.length * (load / softest).cbrt();
+        let wound = turn + inputs.tip_moment.norm() * self.length / softest;
+        let order = 2.0 * stages as f64;
+        let likely = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
+        let likely = likely.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS);
+        if self.extensible || self.step > 0.0 || self.quasi_static {
+            return Ok((uniform(likely as usize), None));
+        }
+        let coarsest = uniform(((turn / COARSEST_TURN).ceil() as usize).max(1));
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely) as usize);
+        // at rest the shape shows what it takes; a release begins with waves that it does not show
+        let begin = if self.start_in_equilibrium { coarsest } else { refiner.start(likely as usize) };
+        Ok((begin, Some(refiner)))
     }
 
     /// The shortest time in which gravity or stiffness move the whole rod, s.
@@ -465,6 +471,10 @@ impl Parameters {
 const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
 const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
+/// Cells at most, over those that are likely to be needed.
+const ROOM: f64 = 4.0;
+/// Turn of the rest shape in a cell of the coarsest mesh, rad.
+const COARSEST_TURN: f64 = 2.5;
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
 /// motion.
 const MAX_CELL_TURN: f64 = 3.0;
@@ -527,7 +537,7 @@ impl Unit {
         let given = |value: &f64| value.is_finite() && *value > 0.0;
         let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
         let rod = parameters.rod();
-        let mesh = parameters.mesh(&rod, inputs, tolerance)?;
+        let (mesh, mut refiner) = parameters.mesh(&rod, inputs, tolerance)?;
         let (way, step) = (parameters.way(&rod, tolerance), parameters.longest_step(&rod, tolerance));
         let path = Path::new(
             match parameters.base_motion {
@@ -546,14 +556,21 @@ impl Unit {
         let state = State::at_rest_shape(&mesh, &boundary.base);
         let mut stepper = Stepper::new(mesh, rod, state);
         if parameters.start_in_equilibrium || parameters.quasi_static {
-            stepper.equilibrium(&boundary).map_err(Error::NoEquilibrium)?;
+            let found = match &mut refiner {
+                Some(refiner) => {
+                    stepper.reserve(refiner.most_cells());
+                    refiner.equilibrium(&mut stepper, &boundary)
+                }
+                None => stepper.equilibrium(&boundary),
+            };
+            found.map_err(Error::NoEquilibrium)?;
             let lowest = modes::modes(&mut stepper, &boundary, 1).map_err(Error::NoEquilibrium)?;
             if let Some(mode) = lowest.iter().find(|mode| mode.omega_squared <= 0.0) {
                 return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
             }
         }
         let scheme = Scheme::from_spectral_radius(parameters.spectral_radius);
-        let integrator = Integrator::new(stepper, way, scheme, step, &boundary).map_err(Error::NoStart)?;
+        let integrator = Integrator::new(stepper, refiner, way, scheme, step, &boundary).map_err(Error::NoStart)?;
         let mut unit = Self {
             integrator,
             step: (way == Way::Equal).then_some(step),

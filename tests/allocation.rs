@@ -9,6 +9,7 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::{Row, State};
 use cosserat_rod::rate;
+use cosserat_rod::refine::Refiner;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::rosenbrock::{RODAS4, RODAS5P};
 use cosserat_rod::stepper::Stepper;
@@ -156,5 +157,42 @@ fn a_plane_rod_allocates_nothing_once_built() {
             });
             assert_eq!(count, 0, "{stages} stages");
         }
+    }
+}
+
+#[test]
+fn a_change_of_cells_allocates_nothing() {
+    let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
+    let boundary = Boundary {
+        tip_force: Vector3::new(0.1, 0.0, 0.0),
+        ..Boundary::hanging_from(base, Vector3::new(9.81, 0.0, 0.0))
+    };
+    let drive = Drive { boundary, rates: Rates::default() };
+    let rod = Rod { tip_mass: 0.01, tip_inertia: 1e-6, ..Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0) };
+    for stages in 1..=4 {
+        let mesh = Mesh::uniform(1.0, 3, stages, Vector3::zeros());
+        // halves all there is, and joins what there is
+        let mut refiners = [0.0, f64::INFINITY].map(|tolerance| Refiner::new(&mesh, tolerance, 12));
+        let mut stepper = Stepper::new(mesh.clone(), rod.clone(), State::at_rest_shape(&mesh, &base));
+        let backup = stepper.state.clone();
+        stepper.reserve(12);
+        let mut plane = Plane::of(&mesh, &rod, &drive, &RODAS4).expect("a plane rod");
+        plane.reserve(12);
+        let count = allocations(|| {
+            stepper.start(&boundary).unwrap();
+            plane.start(&drive).unwrap();
+            for refiner in &mut refiners {
+                for _ in 0..6 {
+                    stepper.attempt(&|_| boundary, 1e-3, 1e-6).unwrap();
+                    stepper.accept();
+                    plane.attempt(&|_| drive, 1e-3).unwrap();
+                    plane.accept();
+                    refiner.adapt(&mut stepper, &boundary).unwrap();
+                    refiner.adapt_plane(&mut plane, &drive).unwrap();
+                }
+            }
+            stepper.resume(&mesh, &backup);
+        });
+        assert_eq!(count, 0, "{stages} stages");
     }
 }

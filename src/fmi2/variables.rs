@@ -343,8 +343,8 @@ pub static ROWS: &[Row] = &[
         "Whether the last internal step was in a plane"),
     scalar("solver.step", "s", Output(|o, _| o.solver.step, Initially::Constant),
         "Length of the last internal step"),
-    scalar("solver.error_estimate", "", Output(|o, _| o.solver.error, Initially::Constant),
-        "Sum of the internal steps' estimated errors of the centreline since the start, over the length; 0 where the parameter step gives their length"),
+    scalar("solver.error_estimate", "", Output(|o, _| o.solver.error + o.solver.space_error, Initially::Constant),
+        "Estimated error of the centreline, over the length: sum of those of the internal steps since the start, and the largest of the cells; 0 where the parameters step and cells give them"),
 ];
 
 /// The units of the table, each with its exponents of kg, m, s and rad.

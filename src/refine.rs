@@ -1,0 +1,514 @@
+//! Cells that choose themselves: what each contributes to the error of the tip, and halves or pairs of them where that is
+//! too much or too little.
+//!
+//! Collocation at the s Gauss points of a cell makes the law of bending and the balance of moments agree there. Beside
+//! them they part by what a polynomial of degree s − 1 cannot follow, seen at the first node, where m is the balance's:
+//!
+//! ```text
+//! δκ₀ = K⁻¹ Rᵀm − (κ − κ̂ + τ κ_t), the latter on the polynomial through the points
+//! |δκ|² = |δκ₀|² / (2s + 1)          the mean over the cell of the Legendre polynomial that vanishes at its points
+//! ```
+//!
+//! Like every functional of the rod, the tip feels the product of this with what the cell misses of the curvature z by
+//! which a force on the tip bends the rod. z is taken to be as rough as κ in the cell, and as large as the moment of the
+//! force about a point as far away as the force in the rod lets bending reach. The tangent, of the turn h κ in the cell,
+//! is summed up by the Gauss rule with its remainder c_s. Over the length L,
+//!
+//! ```text
+//! e = h/L (C |δκ|² ℓ / |κ − κ̂| + c_s (h |κ|)^2s)          ℓ = min(√(EI/|n|), |r_tip − r|, L)
+//! ```
+//!
+//! with the largest curvatures in the cell. It falls as h^2s over the rod, as the error does.
+//!
+//! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; two
+//! cells are joined by their mean square best approximation. Both leave the tip and its velocity where they are, to the
+//! order of e. Still a change raises some waves, and is the better for being made in time: cells are halved long before
+//! they have used up what the tolerance allows, and joined long after.
+
+// J is a matrix
+#![allow(non_snake_case)]
+
+use crate::boundary::{Boundary, Drive};
+use crate::mesh::{Cell, Gauss, Joining, MAX_STAGES, Mesh, Origin};
+use crate::plane::{Bending, Plane};
+use crate::pose::{Section, State};
+use crate::rod::Rod;
+use crate::so3;
+use crate::stepper::{Diverged, Report, Stepper};
+use crate::sweep::{Singular, larger};
+use nalgebra::Vector3;
+
+type Vec3 = Vector3<f64>;
+
+/// C: the largest estimate in a run then is from a fifth to five times the error of the tip, of ropes, a hair, a coil and
+/// a hanging line that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and
+/// less than it for small waves below 1e-6.
+const CALIBRATION: f64 = 2.0;
+/// Part of the tolerance that the cells may use up before they are halved: with a quarter a whip of 25 halvings in a
+/// second raised waves that asked for ever more.
+const SHARE: f64 = 0.05;
+/// Part of that which a pair of cells must keep below once joined.
+const JOINED: f64 = 0.01;
+/// Calls without a change after one: the waves that it has raised are to fade.
+const REST: u32 = 4;
+/// Part of the error of a cell that is remembered at the next call, lest cells that have a moment's rest be joined.
+const MEMORY: f64 = 0.8;
+/// Turn of a cell from end to end beyond which it is halved, and up to which two may be joined, rad: a rotation vector
+/// ends at a full turn.
+const MOST_TURN: [f64; 2] = [4.0, 2.0];
+/// Halvings of a cell of the coarsest mesh; more than radius and length of a rod leave a meaning.
+const MOST_HALVINGS: u32 = 12;
+/// Iterations for the rotation vectors of a cell of given curvature; each gains the turn of the cell in rad, or so.
+const MOST_ITERATIONS: usize = 30;
+
+/// What the cells of a rod contribute to the error of its tip, and which they ought to be.
+#[derive(Clone, Debug)]
+pub struct Refiner {
+    /// Of the position of the tip, over the length.
+    tolerance: f64,
+    most_cells: usize,
+    /// Calls since the last change.
+    waited: u32,
+    /// The coarsest mesh, and the rule.
+    coarsest: Vec<Cell>,
+    rule: Gauss,
+    /// Of the cells, now and lately; the turn of each.
+    errors: Vec<f64>,
+    lately: Vec<f64>,
+    turns: Vec<f64>,
+    /// Halvings of each cell, and its place in its coarsest one in units of the smallest.
+    places: Vec<(usize, u32, u32)>,
+    /// The next cells, and those of which they come.
+    cells: Vec<Cell>,
+    origins: Vec<Origin>,
+    /// Of the rule.
+    remainder: f64,
+    joining: Joining,
+    kept: Vec<f64>,
+}
+
+impl Refiner {
+    /// For rods on `coarsest`, or what becomes of it: none of its cells will be joined, and there will be `most_cells` at
+    /// most. `tolerance` is that of the tip's position, over the length.
+    pub fn new(coarsest: &Mesh, tolerance: f64, most_cells: usize) -> Self {
+        let most_cells = most_cells.max(coarsest.cells.len());
+        let room = || Vec::with_capacity(most_cells);
+        Self {
+            tolerance,
+            most_cells,
+            coarsest: coarsest.cells.clone(),
+            waited: REST,
+            remainder: coarsest.rule.remainder(),
+            joining: Joining::new(&coarsest.rule),
+            rule: coarsest.rule.clone(),
+            errors: room(),
+            lately: room(),
+            kept: room(),
+            turns: room(),
+            places: Vec::with_capacity(most_cells),
+            cells: Vec::with_capacity(most_cells),
+            origins: Vec::with_capacity(most_cells),
+        }
+    }
+
+    /// Copies what later decisions depend on.
+    pub fn copy_from(&mut self, other: &Self) {
+        (self.tolerance, self.most_cells, self.waited) = (other.tolerance, other.most_cells, other.waited);
+        self.lately.clone_from(&other.lately);
+    }
+
+    /// The coarsest mesh with all cells halved until there are `cells`: to start from, where the first instants want more
+    /// than their shape shows.
+    pub fn start(&self, cells: usize) -> Mesh {
+        let mut mesh = Mesh { cells: self.coarsest.clone(), rule: self.rule.clone() };
+        while mesh.cells.len() < cells && 2 * mesh.cells.len() <= self.most_cells {
+            let halves = |cell: &Cell| [Cell { length: 0.5 * cell.length, ..*cell }; 2];
+            mesh.cells = mesh.cells.iter().flat_map(halves).collect();
+        }
+        mesh
+    }
+
+    /// Most cells; a stepper or plane [reserves](Stepper::reserve) as many.
+    pub fn most_cells(&self) -> usize {
+        self.most_cells
+    }
+
+    /// The estimate of the last call of any kind.
+    pub fn estimated(&self) -> f64 {
+        self.errors.iter().sum()
+    }
+
+    /// Estimated error of the tip's position, over the length, that comes of the present cells.
+    pub fn estimate_space(&mut self, stepper: &Stepper) -> f64 {
+        let Stepper { mesh, rod, state, .. } = stepper;
+        let size = |section: &Section| bend(rod, section).norm();
+        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), |j| {
+            let (node, next) = (&state.nodes[j], &state.nodes[j + 1]);
+            let points = &state.points[j * mesh.rule.stages..][..mesh.rule.stages];
+            Bending {
+                missed: missed(&mesh.rule, rod, state, j).norm(),
+                coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
+                    let component = std::array::from_fn(|k| points.get(k).map_or(0.0, |point| bend(rod, point)[i]));
+                    let more = mesh.rule.coefficients(&component);
+                    [low + more[0], high + more[1]]
+                }),
+                at_points: points.iter().map(size).fold(0.0, larger),
+                at_nodes: larger(size(node), size(next)),
+                curvature: state.memory[j * mesh.rule.stages..][..mesh.rule.stages]
+                    .iter()
+                    .map(|memory| memory.kappa.norm())
+                    .fold(0.0, larger),
+                force: larger(node.force.norm(), next.force.norm()),
+                lever: (state.tip().position - node.position).norm(),
+                turn: next.turn.norm(),
+            }
+        })
+    }
+
+    /// The same of a rod in a plane, as it was last looked at.
+    pub fn estimate_plane(&mut self, plane: &Plane) -> f64 {
+        self.estimate(plane.mesh(), plane.stiffness(), |j| plane.bending(j))
+    }
+
+    fn estimate(&mut self, mesh: &Mesh, stiffness: f64, bending: impl Fn(usize) -> Bending) -> f64 {
+        let length = mesh.length();
+        self.errors.clear();
+        self.turns.clear();
+        for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
+            let Bending { missed, coefficients: [low, high], at_points, at_nodes, curvature, force, lever, turn } =
+                bending(j);
+            let stages = mesh.rule.stages as i32;
+            // what is missed is the next of a falling series; waves that the steps have not followed would be taken for more
+            let next = if mesh.rule.stages == MAX_STAGES { high * high / low } else { f64::INFINITY };
+            let missed = (missed * missed).min(next) / f64::from(2 * stages + 1);
+            let arm = length.min(lever).min((stiffness / force).sqrt());
+            // nothing is missed of what is not bent
+            let bent = if missed == 0.0 { 0.0 } else { missed * arm / larger(at_points, at_nodes) };
+            let turned = self.remainder * (h * curvature).powi(2 * stages);
+            self.errors.push(h / length * (CALIBRATION * bent + turned));
+            self.turns.push(turn);
+        }
+        self.estimated()
+    }
+
+    /// Takes the errors into account; whether it is time to change the cells, and they should.
+    fn due(&mut self, mesh: &Mesh) -> bool {
+        self.remember(mesh.cells.len());
+        self.waited = self.waited.saturating_add(1);
+        self.waited > REST && self.plan(mesh, true)
+    }
+
+    fn remember(&mut self, count: usize) {
+        if self.lately.len() != count {
+            self.lately.clear();
+            self.lately.resize(count, 0.0);
+        }
+        for (lately, error) in self.lately.iter_mut().zip(&self.errors) {
+            *lately = larger(*error, MEMORY * *lately);
+        }
+    }
+
+    /// Whether the cells should change, to `cells` with `origins`.
+    fn plan(&mut self, mesh: &Mesh, joins: bool) -> bool {
+        let count = mesh.cells.len();
+        self.find_places(mesh);
+        let allowed = SHARE * self.tolerance / count as f64;
+        // of a cell twice as long
+        let growth = 4f64.powi(self.rule.stages as i32);
+        let mut room = self.most_cells - count.min(self.most_cells);
+        self.origins.clear();
+        self.kept.clear();
+        let mut j = 0;
+        while j < count {
+            let (error, (root, level, start)) = (self.lately[j], self.places[j]);
+            let halve = !(error <= allowed && self.turns[j] < MOST_TURN[0]) && level < MOST_HALVINGS && room > 0;
+            let width = 1 << (MOST_HALVINGS - level);
+            let joined = match self.lately.get(j + 1) {
+                Some(next) if joins && level > 0 && start % (2 * width) == 0 => {
+                    let other = self.places[j + 1];
+                    let turn = self.turns[j] + self.turns[j + 1];
+                    let error = growth * (error + next);
+                    let pair = other == (root, level, start + width) && turn < MOST_TURN[1];
+                    (pair && error <= JOINED * allowed).then_some(error)
+                }
+                _ => None,
+            };
+            if halve {
+                room -= 1;
+                self.origins.extend([Origin::First(j), Origin::Second(j)]);
+                self.kept.extend([0.5 * error / growth; 2]);
+            } else if let Some(error) = joined {
+                self.origins.push(Origin::Pair(j));
+                self.kept.push(error);
+                j += 1;
+            } else {
+                self.origins.push(Origin::Same(j));
+                self.kept.push(error);
+            }
+            j += 1;
+        }
+        let changes = self.origins.iter().any(|origin| !matches!(origin, Origin::Same(_)));
+        if changes {
+            self.cells.clear();
+            self.cells.extend(self.origins.iter().map(|origin| origin.cell(&mesh.cells)));
+        }
+        changes
+    }
+
+    /// Where the cells lie in the coarsest ones: lengths halve exactly.
+    fn find_places(&mut self, mesh: &Mesh) {
+        const WHOLE: u32 = 1 << MOST_HALVINGS;
+        let (mut root, mut start) = (0, 0);
+        self.places.clear();
+        for cell in &mesh.cells {
+            let width = (cell.length / self.coarsest[root].length * f64::from(WHOLE)).round() as u32;
+            self.places.push((root, MOST_HALVINGS - width.max(1).ilog2().min(MOST_HALVINGS), start));
+            start = u32::saturating_add(start, width);
+            if start >= WHOLE && root + 1 < self.coarsest.len() {
+                (root, start) = (root + 1, 0);
+            }
+        }
+    }
+
+    /// Refines and coarsens the cells of a rod that neither shears nor stretches, clamped at its base and free at its
+    /// tip; whether they have changed. Others keep their cells. `boundary` is what acts now; the accelerations are
+    /// consistent with it afterwards, as after [`Stepper::accelerate`], and [`Stepper::previous`] is lost.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the equations of a cell are singular; the rod is as before.
+    pub fn adapt(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Diverged> {
+        self.estimate_space(stepper);
+        let unfit = stepper.rod.is_extensible() || boundary.holds_positions();
+        if unfit || !self.due(&stepper.mesh) {
+            return Ok(false);
+        }
+        self.change(stepper, boundary)?;
+        Ok(true)
+    }
+
+    /// The same of a rod in a plane; there is no looking back into the last step afterwards.
+    ///
+    /// # Errors
+    /// [`Singular`] as of [`Plane::start`]; the rod is as before.
+    pub fn adapt_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Singular> {
+        plane.look(1.0, drive);
+        self.estimate_plane(plane);
+        if !self.due(plane.mesh()) {
+            return Ok(false);
+        }
+        plane.remesh(&mut self.cells, &self.origins, &self.joining, drive)?;
+        self.changed();
+        Ok(true)
+    }
+
+    /// The static equilibrium under `boundary`, on cells as fine as the tolerance asks for, and as Newton needs.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Stepper::equilibrium`].
+    pub fn equilibrium(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<Report, Diverged> {
+        let unfit = stepper.rod.is_extensible() || boundary.holds_positions();
+        let mut iterations = 0;
+        loop {
+            let count = stepper.mesh.cells.len();
+            let report = stepper.equilibrium(boundary);
+            match report {
+                Ok(report) => {
+                    iterations += report.iterations;
+                    self.estimate_space(stepper);
+                    self.remember(count);
+                    if unfit || !self.plan(&stepper.mesh, false) {
+                        return Ok(Report { iterations, ..report });
+                    }
+                }
+                Err(diverged) => {
+                    iterations += diverged.iterations;
+                    // all cells are too long
+                    self.estimate_space(stepper);
+                    self.lately.clear();
+                    self.lately.resize(count, f64::INFINITY);
+                    if unfit || 2 * count > self.most_cells || !self.plan(&stepper.mesh, false) {
+                        return Err(Diverged { iterations, ..diverged });
+                    }
+                    self.kept.fill(0.0);
+                }
+            }
+            // not those that it did not get to: loads go on from them
+            let reached = stepper.state.boundary;
+            self.change(stepper, &reached)?;
+        }
+    }
+
+    fn change(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<(), Diverged> {
+        let Self { cells, origins, joining, .. } = self;
+        let (mesh, rod, before, state) = stepper.remesh(cells);
+        transfer((cells, before), (origins, joining), (mesh, state), rod);
+        if let Err(diverged) = stepper.accelerate(boundary) {
+            stepper.undo_remesh(cells);
+            return Err(diverged);
+        }
+        self.changed();
+        Ok(())
+    }
+
+    fn changed(&mut self) {
+        self.waited = 0;
+        std::mem::swap(&mut self.lately, &mut self.kept);
+    }
+}
+
+/// What the curvature of the law misses at the first node of a cell, by the balance of moments.
+fn missed(rule: &Gauss, rod: &Rod, state: &State, cell: usize) -> Vec3 {
+    let at_points = lane(rule.stages, |k| bend(rod, &state.points[cell * rule.stages + k]));
+    bend(rod, &state.nodes[cell]) - sum(&rule.through(0.0), &at_points)
+}
+
+/// K⁻¹ Rᵀm.
+fn bend(rod: &Rod, section: &Section) -> Vec3 {
+    section.rotation.tr_mul(&section.moment).component_div(&rod.stiffness)
+}
+
+type Lane = [Vec3; MAX_STAGES];
+
+/// Σ weights_k x_k.
+fn sum(weights: &[f64; MAX_STAGES], x: &Lane) -> Vec3 {
+    x.iter().zip(weights).fold(Vec3::zeros(), |sum, (x, weight)| sum + x * *weight)
+}
+
+fn lane(stages: usize, value: impl Fn(usize) -> Vec3) -> Lane {
+    std::array::from_fn(|k| if k < stages { value(k) } else { Vec3::zeros() })
+}
+
+/// What of a cell does not depend on where it is, at its points: the rotation vector from its first node and κ, with their
+/// rates.
+struct Shape {
+    phi: Lane,
+    phi_t: Lane,
+    kappa: Lane,
+    kappa_t: Lane,
+}
+
+impl Shape {
+    /// Of a cell of `state`, whose first node has the angular velocity `omega`.
+    fn of(rule: &Gauss, h: f64, state: &State, cell: usize, omega: &Vec3) -> Self {
+        let Gauss { stages, a_inverse, .. } = rule;
+        let first = cell * stages;
+        let phi = lane(*stages, |k| state.points[first + k].turn);
+        let phi_t = lane(*stages, |k| {
+            let relative = state.memory[first + k].spin.velocity.value - so3::exp(&phi[k]).tr_mul(omega);
+            so3::inverse_right_jacobian(&phi[k]) * relative
+        });
+        let kappa_t = lane(*stages, |k| {
+            let (g, g_t) = (sum(&a_inverse[k], &phi) / h, sum(&a_inverse[k], &phi_t) / h);
+            let map = so3::Tangent::new(&phi[k]);
+            map.jacobian() * g_t + map.by_log(&g) * phi_t[k]
+        });
+        Self { phi, phi_t, kappa: lane(*stages, |k| state.memory[first + k].kappa), kappa_t }
+    }
+
+    /// Of a cell of length `h` with these curvatures: collocates Φ_s = J_r⁻¹(Φ) κ and its rate.
+    fn bent(rule: &Gauss, h: f64, kappa: Lane, kappa_t: Lane) -> Self {
+        let mut shape = Self { phi: [Vec3::zeros(); MAX_STAGES], phi_t: [Vec3::zeros(); MAX_STAGES], kappa, kappa_t };
+        for _ in 0..MOST_ITERATIONS {
+            let maps = shape.phi.map(|phi| so3::Tangent::new(&phi));
+            let g = lane(rule.stages, |k| maps[k].inverse_times(&kappa[k]));
+            let g_t =
+                lane(rule.stages, |k| maps[k].inverse_times(&(kappa_t[k] - maps[k].by_log(&g[k]) * shape.phi_t[k])));
+            let phi = lane(rule.stages, |k| sum(&rule.a[k], &g) * h);
+            let change = (0..rule.stages).map(|k| (phi[k] - shape.phi[k]).norm()).fold(0.0, larger);
+            shape.phi_t = lane(rule.stages, |k| sum(&rule.a[k], &g_t) * h);
+            shape.phi = phi;
+            if change < 4.0 * f64::EPSILON {
+                break;
+            }
+        }
+        shape
+    }
+
+    /// Weights of the points at the next node, of what vanishes at the first.
+    fn end_weights(rule: &Gauss) -> [f64; MAX_STAGES] {
+        std::array::from_fn(|k| (0..rule.stages).map(|l| rule.b[l] * rule.a_inverse[l][k]).sum())
+    }
+
+    /// The angular velocity of the next node.
+    fn end(&self, rule: &Gauss, omega: &Vec3) -> Vec3 {
+        let end = Self::end_weights(rule);
+        spin(omega, &sum(&end, &self.phi), &sum(&end, &self.phi_t))
+    }
+
+    /// Puts it behind node `cell` with the angular velocity `omega`; the one of the next node.
+    fn put(&self, rule: &Gauss, state: &mut State, cell: usize, omega: &Vec3) -> Vec3 {
+        let start = state.nodes[cell].rotation;
+        for k in 0..rule.stages {
+            let i = cell * rule.stages + k;
+            let (point, memory) = (&mut state.points[i], &mut state.memory[i]);
+            (point.turn, point.rotation) = (self.phi[k], start * so3::exp(&self.phi[k]));
+            memory.spin.velocity.value = spin(omega, &self.phi[k], &self.phi_t[k]);
+            (memory.kappa, memory.strain.velocity.value) = (self.kappa[k], self.kappa_t[k]);
+        }
+        let node = &mut state.nodes[cell + 1];
+        node.turn = sum(&Self::end_weights(rule), &self.phi);
+        node.rotation = start * so3::exp(&node.turn);
+        self.end(rule, omega)
+    }
+}
+
+/// The angular velocity of a section Φ beyond one that has `omega`.
+fn spin(omega: &Vec3, phi: &Vec3, phi_t: &Vec3) -> Vec3 {
+    so3::right_jacobian(phi) * phi_t + so3::exp(phi).tr_mul(omega)
+}
+
+/// Puts the rod on another mesh: at the points of new cells its curvature is what the balance of moments asks for, and
+/// the rate of that what it was. All but the accelerations follow.
+fn transfer(
+    before: (&[Cell], &State),
+    (origins, joining): (&[Origin], &Joining),
+    (mesh, state): (&Mesh, &mut State),
+    rod: &Rod,
+) {
+    let (rule, stages, old) = (&mesh.rule, mesh.rule.stages, before.1);
+    (state.boundary, state.dt, state.scheme, state.row) = (old.boundary, 0.0, old.scheme, old.row);
+    state.nodes[0] = old.nodes[0];
+    let spin = old.nodes[0].rotation.tr_mul(&old.boundary.base.angular_velocity);
+    let (mut old_spin, mut new_spin) = (spin, spin);
+    for (j, origin) in origins.iter().enumerate() {
+        let [(first, _), (last, _)] = [origin.at(0.0), origin.at(1.0)];
+        let shape_of = |cell: usize, spin: &Vec3| Shape::of(rule, before.0[cell].length, old, cell, spin);
+        let shape = shape_of(first, &old_spin);
+        let mut passed = shape.end(rule, &old_spin);
+        let next = (last != first).then(|| shape_of(last, &passed));
+        let shape = match *origin {
+            Origin::Same(_) => shape,
+            _ => {
+                let at = |k: usize| {
+                    if let Some(next) = &next {
+                        let [here, there] = joining.weights.map(|weights| weights[k]);
+                        let joined = |of: fn(&Shape) -> &Lane| sum(&here, of(&shape)) + sum(&there, of(next));
+                        return (joined(|shape| &shape.kappa), joined(|shape| &shape.kappa_t));
+                    }
+                    let (_, theta) = origin.at(rule.c[k]);
+                    let through = rule.through(theta);
+                    // at a release moments are balanced that have not bent the rod yet
+                    let bent = |kappa: &Vec3| (kappa - before.0[first].kappa_rest).norm();
+                    let most = shape.kappa[..stages].iter().map(bent).fold(0.0, larger);
+                    let missed = missed(rule, rod, old, first);
+                    let beside = missed * (rule.beside(theta) * (most / missed.norm()).min(1.0));
+                    (sum(&through, &shape.kappa) + beside, sum(&through, &shape.kappa_t))
+                };
+                Shape::bent(rule, mesh.cells[j].length, lane(stages, |k| at(k).0), lane(stages, |k| at(k).1))
+            }
+        };
+        new_spin = shape.put(rule, state, j, &new_spin);
+        if let Some(next) = next {
+            passed = next.end(rule, &passed);
+        }
+        if !matches!(origin, Origin::First(_)) {
+            old_spin = passed;
+        }
+    }
+    if let Some(tip) = state.memory.last_mut() {
+        *tip = *old.tip_memory();
+        tip.spin.velocity.value = new_spin;
+    }
+    state.rebuild_positions(mesh, rod);
+    state.rebuild_velocities(mesh);
+}
