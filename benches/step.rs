@@ -197,7 +197,7 @@ const WHOLE_STEP: f64 = 1e-3;
 const WHOLE_STAGES: usize = 2;
 
 impl Whole {
-    /// Coils of rubber that turn with their base about an axis along which the rod is pulled: every cell is bent alike.
+    /// A coil of rubber at rest: every stage of a step in space takes one iteration, however many the cells.
     fn new(of: &str, cells: usize) -> Self {
         let rod = Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0);
         let length = CELL * cells as f64;
@@ -205,7 +205,7 @@ impl Whole {
         let kappa = if spatial { Vector3::new(2.0, 0.0, 1.0) } else { Vector3::y() * 2.0 };
         let mesh = Mesh::uniform(length, cells, WHOLE_STAGES, kappa);
         let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
-        let boundary = Boundary::hanging_from(base, Vector3::x() * 1e-3);
+        let boundary = Boundary::hanging_from(base, Vector3::zeros());
         if spatial {
             let state = State::at_rest_shape(&mesh, &base);
             let mut stepper = Stepper::new(mesh, rod, state);
