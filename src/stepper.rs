@@ -547,7 +547,7 @@ impl Stepper {
                 pose::assemble_residuals(mesh, rod, old, trial, boundary, time, system);
                 sweep.solve_for(&system.residuals);
             } else {
-                factorised += 1;
+                (factorised, borrowed) = (factorised + 1, false);
                 pose::assemble(mesh, rod, old, trial, boundary, time, system);
                 if let Err(singular) = sweep.solve(system) {
                     return diverged(system, Reason::Singular(singular));
@@ -571,13 +571,15 @@ impl Stepper {
             trial.apply(&sweep.nodes, &sweep.points, (MAX_ROTATION / turn).min(1.0), time.row());
             let left = rate / (1.0 - rate) * size;
             let seen = keep && before.is_finite();
-            if if seen { left <= target } else { !keep && size * NEWTON_LEAVES <= target } {
+            let converged = if seen { left <= target } else { !keep && size * NEWTON_LEAVES <= target };
+            if converged {
                 if *factors == Factors::Missing {
                     *factors = Factors::Good;
                 }
                 return Ok(iterations);
             }
-            if factorised == if *factors == Factors::Unused { MAX_STAGE_ITERATIONS } else { MAX_SMOOTH_ITERATIONS } {
+            let most = if *factors == Factors::Unused { MAX_STAGE_ITERATIONS } else { MAX_SMOOTH_ITERATIONS };
+            if factorised == most {
                 return diverged(system, Reason::TooManyIterations);
             }
             let soon = !seen || left * rate.powi(SOON) <= target;

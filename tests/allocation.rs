@@ -135,6 +135,26 @@ fn a_communication_step_allocates_nothing() {
 }
 
 #[test]
+fn a_step_of_order_4_allocates_nothing() {
+    let boundary =
+        Boundary::hanging_from(Support::at_rest(Vector3::zeros(), Matrix3::identity()), Vector3::new(9.81, 0.0, 0.0));
+    let mut stepper = {
+        let mesh = Mesh::uniform(1.0, 3, 4, Vector3::zeros());
+        let state = State::at_rest_shape(&mesh, &boundary.base);
+        Stepper::new(mesh, Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0), state)
+    };
+    stepper.start(&boundary).unwrap();
+    let count = allocations(|| {
+        // one whose factors serve, and one that is lost
+        stepper.attempt(&|_| boundary, 5e-3, 1e-6).unwrap();
+        stepper.accept();
+        std::hint::black_box(stepper.look(0.3, &boundary));
+        stepper.attempt(&|_| boundary, 10.0, 1e-6).unwrap_err();
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
 fn a_plane_rod_allocates_nothing_once_built() {
     let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
     let boundary = Boundary {
