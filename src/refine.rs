@@ -42,9 +42,9 @@ use nalgebra::Vector3;
 
 type Vec3 = Vector3<f64>;
 
-/// C: the largest estimate in a run then is from a fifth to five times the error of the tip, of ropes, a hair, a coil and
-/// a hanging line that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and
-/// less than it for small waves below 1e-6.
+/// C: the largest estimate in a run then is from half to ten times the error of the tip, of a rope, a hair, a struck cord
+/// and one that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and less
+/// than it for the small waves of a wire below 1e-6.
 const CALIBRATION: f64 = 2.0;
 /// Part of the tolerance that the cells may use up before they are halved: with a quarter a whip of 25 halvings in a
 /// second raised waves that asked for ever more.
