@@ -4,6 +4,7 @@
 //! 2s. s = 1 is the midpoint box.
 
 use nalgebra::{Matrix4, Vector3};
+use std::array::from_fn;
 
 /// Most Gauss points in a cell.
 pub const MAX_STAGES: usize = 4;
@@ -49,7 +50,7 @@ impl Gauss {
         // identity beyond s, so that one 4 × 4 inverse serves all; Gauss matrices are regular
         let entry = |i: usize, j: usize| if i < stages && j < stages { rule.a[i][j] } else { f64::from(i == j) };
         let inverse = Matrix4::from_fn(entry).try_inverse().unwrap_or_default();
-        rule.a_inverse = std::array::from_fn(|k| std::array::from_fn(|l| inverse[(k, l)]));
+        rule.a_inverse = from_fn(|k| from_fn(|l| inverse[(k, l)]));
         rule
     }
 
@@ -76,7 +77,7 @@ impl Gauss {
     /// Weights of the values at the points in that at `theta` of the polynomial through them.
     pub fn through(&self, theta: f64) -> [f64; MAX_STAGES] {
         let others = |k: usize| (0..self.stages).filter(move |&j| j != k);
-        std::array::from_fn(|k| match k < self.stages {
+        from_fn(|k| match k < self.stages {
             true => others(k).map(|j| (theta - self.c[j]) / (self.c[k] - self.c[j])).product(),
             false => 0.0,
         })
@@ -86,46 +87,46 @@ impl Gauss {
     pub fn beside(&self, theta: f64) -> f64 {
         self.c[..self.stages].iter().map(|c| 1.0 - theta / c).product()
     }
-
-    /// The squares of the Legendre coefficients of degrees 0 and 1, and of degrees 2 and 3, of the polynomial with these
-    /// values at the points, summed up by pairs.
-    pub fn coefficients(&self, values: &[f64; MAX_STAGES]) -> [f64; 2] {
-        let square = |n: usize| {
-            let terms = (0..self.stages).map(|k| self.b[k] * legendre(n, 2.0 * self.c[k] - 1.0) * values[k]);
-            if n < self.stages { ((2 * n + 1) as f64 * terms.sum::<f64>()).powi(2) } else { 0.0 }
-        };
-        [square(0) + square(1), square(2) + square(3)]
-    }
-
-    /// The error of the rule for a function of length 1, over its derivative of order 2s.
-    pub fn remainder(&self) -> f64 {
-        let s = self.stages;
-        // (s!)⁴ / ((2s + 1) ((2s)!)³)
-        let factorials = (1..=s).map(|k| (k as f64).powi(4)).product::<f64>();
-        factorials / ((2 * s + 1) as f64 * (1..=2 * s).map(|k| (k as f64).powi(3)).product::<f64>())
-    }
 }
 
-/// Values at the points of a cell from those of a function at the points of its two halves: its mean square best
-/// approximation by a polynomial of degree s − 1. It keeps the integral, and s − 1 moments more.
+/// What values at the points of a cell say of the polynomial through them, and of a cell twice as long.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Joining {
-    /// By half, point of the cell, point of the half.
-    pub weights: [[[f64; MAX_STAGES]; MAX_STAGES]; 2],
+pub struct Series {
+    /// Weights of its value at 0.
+    pub start: [f64; MAX_STAGES],
+    /// Weights of its Legendre coefficients.
+    pub legendre: [[f64; MAX_STAGES]; MAX_STAGES],
+    /// Weights of the points of either half in those of a whole cell, by half, point of the cell, point of the half: the
+    /// mean square best approximation. It keeps the integral, and s − 1 moments more.
+    pub joined: [[[f64; MAX_STAGES]; MAX_STAGES]; 2],
+    /// The error of the rule for a function of length 1, over its derivative of order 2s.
+    pub remainder: f64,
 }
 
-impl Joining {
+impl Series {
     /// For cells of a rule.
     pub fn new(rule: &Gauss) -> Self {
-        let weight = |half: usize, k: usize, l: usize| {
+        let s = rule.stages;
+        let within = |i: usize, j: usize, value: f64| if i.max(j) < s { value } else { 0.0 };
+        let coefficient = |n: usize, at: f64| (2 * n + 1) as f64 * legendre(n, at);
+        let joined = |half: usize, k: usize, l: usize| {
             let (at, from) = (2.0 * rule.c[k] - 1.0, rule.c[l] + half as f64 - 1.0);
-            let degrees = 0..rule.stages;
-            degrees.map(|n| (n as f64 + 0.5) * legendre(n, at) * legendre(n, from)).sum::<f64>() * rule.b[l]
+            (0..s).map(|n| 0.5 * coefficient(n, from) * legendre(n, at)).sum::<f64>() * rule.b[l]
         };
-        let within = |half, k: usize, l: usize| if k.max(l) < rule.stages { weight(half, k, l) } else { 0.0 };
+        // (s!)⁴ / ((2s + 1) ((2s)!)³)
+        let product = |to: usize, power: i32| (1..=to).map(|k| (k as f64).powi(power)).product::<f64>();
         Self {
-            weights: std::array::from_fn(|half| std::array::from_fn(|k| std::array::from_fn(|l| within(half, k, l)))),
+            start: rule.through(0.0),
+            legendre: from_fn(|n| from_fn(|k| within(n, k, coefficient(n, 2.0 * rule.c[k] - 1.0) * rule.b[k]))),
+            joined: from_fn(|half| from_fn(|k| from_fn(|l| within(k, l, joined(half, k, l))))),
+            remainder: product(s, 4) / ((2 * s + 1) as f64 * product(2 * s, 3)),
         }
+    }
+
+    /// The squares of the Legendre coefficients of degrees 0 and 1, and of degrees 2 and 3, summed up by pairs.
+    pub fn coefficients(&self, values: &[f64; MAX_STAGES]) -> [f64; 2] {
+        let square = |n: usize| (0..MAX_STAGES).map(|k| self.legendre[n][k] * values[k]).sum::<f64>().powi(2);
+        [square(0) + square(1), square(2) + square(3)]
     }
 }
 
@@ -234,6 +235,37 @@ mod tests {
                     assert!((sum - rule.c[k].powi(degree as i32 + 1) / (degree + 1) as f64).abs() < 1e-15);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn values_at_the_points_continue_and_join_exactly() {
+        for s in 1..=MAX_STAGES {
+            let rule = Gauss::new(s);
+            let series = Series::new(&rule);
+            let sum = |weights: &[f64; MAX_STAGES], value: &dyn Fn(f64) -> f64| {
+                (0..s).map(|k| weights[k] * value(rule.c[k])).sum::<f64>()
+            };
+            for degree in 0..s as i32 {
+                let power = |x: f64| x.powi(degree);
+                assert!((sum(&rule.through(0.3), &power) - power(0.3)).abs() < 1e-14);
+                for k in 0..s {
+                    // of the halves, as of functions of their own place
+                    let halves =
+                        [0.0, 1.0].map(|half| sum(&series.joined[half as usize][k], &|c| power(0.5 * (c + half))));
+                    assert!((halves[0] + halves[1] - power(rule.c[k])).abs() < 1e-14, "{s} stages, degree {degree}");
+                }
+            }
+            for n in 0..s {
+                let coefficient = |m: usize| sum(&series.legendre[m], &|c| legendre(n, 2.0 * c - 1.0));
+                assert!((0..s).all(|m| (coefficient(m) - f64::from(m == n)).abs() < 1e-14));
+            }
+            // x^2s, whose derivative is (2s)!
+            let degree = 2 * s as i32;
+            let missed = 1.0 / f64::from(degree + 1) - sum(&rule.b, &|c| c.powi(degree));
+            let factorial: f64 = (1..=degree).map(f64::from).product();
+            assert!((missed / (series.remainder * factorial) - 1.0).abs() < 1e-9, "{s} stages: {missed:e}");
+            assert!((rule.beside(0.0) - 1.0).abs() < 1e-15 && rule.beside(rule.c[0]).abs() < 1e-15);
         }
     }
 }

@@ -30,7 +30,7 @@
 use crate::alpha::Motion;
 use crate::boundary::{Boundary, Drive, Held, Support};
 use crate::energy::{Energy, Powers};
-use crate::mesh::{self, Gauss, Joining, MAX_STAGES, Mesh, Origin};
+use crate::mesh::{self, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::pose::{self, State};
 use crate::rod::Rod;
 use crate::rosenbrock::Rosenbrock;
@@ -385,7 +385,7 @@ pub struct Kept {
 pub(crate) struct Bending {
     /// What the curvature of the law misses at the first node, by the balance of moments, 1/m.
     pub(crate) missed: f64,
-    /// As [`Gauss::coefficients`] has them, of κ − κ̂ of the law, 1/m².
+    /// As [`Series::coefficients`] has them, of κ − κ̂ of the law, 1/m².
     pub(crate) coefficients: [f64; 2],
     /// Largest |κ − κ̂| of the law at the points, and of the balance at the nodes, 1/m.
     pub(crate) at_points: f64,
@@ -629,7 +629,7 @@ impl Plane {
         &mut self,
         cells: &mut Vec<mesh::Cell>,
         origins: &[Origin],
-        joining: &Joining,
+        series: &Series,
         drive: &Drive,
     ) -> Result<(), Singular> {
         self.look(1.0, drive);
@@ -640,7 +640,7 @@ impl Plane {
             match *origin {
                 Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
                 Origin::First(old) | Origin::Second(old) => {
-                    let missed = self.bending(old).missed();
+                    let missed = self.bending(old, series).missed();
                     for k in 0..self.mesh.rule.stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);
                         let through = self.mesh.rule.through(theta);
@@ -650,7 +650,7 @@ impl Plane {
                     }
                 }
                 Origin::Pair(old) => {
-                    for (half, weights) in joining.weights.iter().enumerate() {
+                    for (half, weights) in series.joined.iter().enumerate() {
                         for (q, strain) in strain.iter_mut().enumerate() {
                             let g = &self.fields[old + half].strain[q];
                             *strain = lane(|k| strain[k] + total(&weights[k], g));
@@ -686,15 +686,15 @@ impl Plane {
     }
 
     /// How a cell is bent at the instant last looked at.
-    pub(crate) fn bending(&self, cell: usize) -> Bending {
+    pub(crate) fn bending(&self, cell: usize, series: &Series) -> Bending {
         let (field, next) = (&self.fields[cell], self.fields.get(cell + 1).map_or(&self.tip, |field| &field.node));
         let per_stiffness = 1.0 / self.section.stiffness;
         let size = |[x, y]: [f64; 2]| f64::hypot(x, y);
         let points = field.moment.map(|m| m * per_stiffness);
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         Bending {
-            missed: field.node.moment * per_stiffness - total(&self.mesh.rule.through(0.0), &points),
-            coefficients: self.mesh.rule.coefficients(&points),
+            missed: field.node.moment * per_stiffness - total(&series.start, &points),
+            coefficients: series.coefficients(&points),
             at_points: largest(&points),
             at_nodes: largest(&[field.node.moment, next.moment]) * per_stiffness,
             curvature: largest(&field.strain[0]),

@@ -9,6 +9,8 @@
 //! |δκ|² = |δκ₀|² / (2s + 1)          the mean over the cell of the Legendre polynomial that vanishes at its points
 //! ```
 //!
+//! but, at s = 4, no more than what the coefficients of κ − κ̂ let expect, as they fall.
+//!
 //! Like every functional of the rod, the tip feels the product of this with what the cell misses of the curvature z by
 //! which a force on the tip bends the rod. z is taken to be as rough as κ in the cell, and as large as the moment of the
 //! force about a point as far away as the force in the rod lets bending reach. The tangent, of the turn h κ in the cell,
@@ -29,7 +31,7 @@
 #![allow(non_snake_case)]
 
 use crate::boundary::{Boundary, Drive};
-use crate::mesh::{Cell, Gauss, Joining, MAX_STAGES, Mesh, Origin};
+use crate::mesh::{Cell, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::plane::{Bending, Plane};
 use crate::pose::{Section, State};
 use crate::rod::Rod;
@@ -40,15 +42,15 @@ use nalgebra::Vector3;
 
 type Vec3 = Vector3<f64>;
 
-/// C: the largest estimate in a run then is from a fifth to five times the error of the tip, of ropes, a hair, a coil and
-/// a hanging line that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and
-/// less than it for small waves below 1e-6.
+/// C: the largest estimate in a run then is from half to ten times the error of the tip, of a rope, a hair, a struck cord
+/// and one that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and less
+/// than it for the small waves of a wire below 1e-6.
 const CALIBRATION: f64 = 2.0;
 /// Part of the tolerance that the cells may use up before they are halved: with a quarter a whip of 25 halvings in a
 /// second raised waves that asked for ever more.
 const SHARE: f64 = 0.05;
 /// Part of that which a pair of cells must keep below once joined.
-const JOINED: f64 = 0.01;
+const JOINED: f64 = 0.001;
 /// Calls without a change after one: the waves that it has raised are to fade.
 const REST: u32 = 4;
 /// Part of the error of a cell that is remembered at the next call, lest cells that have a moment's rest be joined.
@@ -81,15 +83,17 @@ pub struct Refiner {
     /// The next cells, and those of which they come.
     cells: Vec<Cell>,
     origins: Vec<Origin>,
-    /// Of the rule.
-    remainder: f64,
-    joining: Joining,
+    series: Series,
     kept: Vec<f64>,
 }
 
 impl Refiner {
     /// For rods on `coarsest`, or what becomes of it: none of its cells will be joined, and there will be `most_cells` at
     /// most. `tolerance` is that of the tip's position, over the length.
+    ///
+    /// A rod at rest may be straight, and tell nothing of what will come: a quarter of the cells that a load of the kind it
+    /// has will want, by any rule, are coarse enough. From one cell the first blow to a hanging cord costs 4e-3 of its
+    /// length, from two 1e-4.
     pub fn new(coarsest: &Mesh, tolerance: f64, most_cells: usize) -> Self {
         let most_cells = most_cells.max(coarsest.cells.len());
         let room = || Vec::with_capacity(most_cells);
@@ -98,8 +102,7 @@ impl Refiner {
             most_cells,
             coarsest: coarsest.cells.clone(),
             waited: REST,
-            remainder: coarsest.rule.remainder(),
-            joining: Joining::new(&coarsest.rule),
+            series: Series::new(&coarsest.rule),
             rule: coarsest.rule.clone(),
             errors: room(),
             lately: room(),
@@ -117,8 +120,8 @@ impl Refiner {
         self.lately.clone_from(&other.lately);
     }
 
-    /// The coarsest mesh with all cells halved until there are `cells`: to start from, where the first instants want more
-    /// than their shape shows.
+    /// The coarsest mesh with all cells halved until there are `cells`: to start from, as many as any rule asks for. In the
+    /// first instants of a release nothing is bent yet.
     pub fn start(&self, cells: usize) -> Mesh {
         let mut mesh = Mesh { cells: self.coarsest.clone(), rule: self.rule.clone() };
         while mesh.cells.len() < cells && 2 * mesh.cells.len() <= self.most_cells {
@@ -141,23 +144,22 @@ impl Refiner {
     /// Estimated error of the tip's position, over the length, that comes of the present cells.
     pub fn estimate_space(&mut self, stepper: &Stepper) -> f64 {
         let Stepper { mesh, rod, state, .. } = stepper;
-        let size = |section: &Section| bend(rod, section).norm();
-        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), |j| {
+        let stages = mesh.rule.stages;
+        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), |series, j| {
             let (node, next) = (&state.nodes[j], &state.nodes[j + 1]);
-            let points = &state.points[j * mesh.rule.stages..][..mesh.rule.stages];
+            let at_points = bend_at_points(rod, state, stages, j);
+            let at_node = bend(rod, node);
+            let largest = |vectors: &[Vec3]| vectors.iter().map(Vec3::norm).fold(0.0, larger);
+            let kappa = state.memory[j * stages..][..stages].iter().map(|memory| memory.kappa.norm());
             Bending {
-                missed: missed(&mesh.rule, rod, state, j).norm(),
+                missed: (at_node - sum(&series.start, &at_points)).norm(),
                 coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
-                    let component = std::array::from_fn(|k| points.get(k).map_or(0.0, |point| bend(rod, point)[i]));
-                    let more = mesh.rule.coefficients(&component);
+                    let more = series.coefficients(&at_points.map(|kappa| kappa[i]));
                     [low + more[0], high + more[1]]
                 }),
-                at_points: points.iter().map(size).fold(0.0, larger),
-                at_nodes: larger(size(node), size(next)),
-                curvature: state.memory[j * mesh.rule.stages..][..mesh.rule.stages]
-                    .iter()
-                    .map(|memory| memory.kappa.norm())
-                    .fold(0.0, larger),
+                at_points: largest(&at_points),
+                at_nodes: largest(&[at_node, bend(rod, next)]),
+                curvature: kappa.fold(0.0, larger),
                 force: larger(node.force.norm(), next.force.norm()),
                 lever: (state.tip().position - node.position).norm(),
                 turn: next.turn.norm(),
@@ -167,24 +169,23 @@ impl Refiner {
 
     /// The same of a rod in a plane, as it was last looked at.
     pub fn estimate_plane(&mut self, plane: &Plane) -> f64 {
-        self.estimate(plane.mesh(), plane.stiffness(), |j| plane.bending(j))
+        self.estimate(plane.mesh(), plane.stiffness(), |series, j| plane.bending(j, series))
     }
 
-    fn estimate(&mut self, mesh: &Mesh, stiffness: f64, bending: impl Fn(usize) -> Bending) -> f64 {
-        let length = mesh.length();
+    fn estimate(&mut self, mesh: &Mesh, stiffness: f64, bending: impl Fn(&Series, usize) -> Bending) -> f64 {
+        let (length, stages) = (mesh.length(), mesh.rule.stages as i32);
         self.errors.clear();
         self.turns.clear();
         for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
             let Bending { missed, coefficients: [low, high], at_points, at_nodes, curvature, force, lever, turn } =
-                bending(j);
-            let stages = mesh.rule.stages as i32;
-            // what is missed is the next of a falling series; waves that the steps have not followed would be taken for more
+                bending(&self.series, j);
+            // the next of a falling series: waves that the steps have not followed are not taken for more
             let next = if mesh.rule.stages == MAX_STAGES { high * high / low } else { f64::INFINITY };
             let missed = (missed * missed).min(next) / f64::from(2 * stages + 1);
             let arm = length.min(lever).min((stiffness / force).sqrt());
             // nothing is missed of what is not bent
             let bent = if missed == 0.0 { 0.0 } else { missed * arm / larger(at_points, at_nodes) };
-            let turned = self.remainder * (h * curvature).powi(2 * stages);
+            let turned = self.series.remainder * (h * curvature).powi(2 * stages);
             self.errors.push(h / length * (CALIBRATION * bent + turned));
             self.turns.push(turn);
         }
@@ -296,7 +297,7 @@ impl Refiner {
         if !self.due(plane.mesh()) {
             return Ok(false);
         }
-        plane.remesh(&mut self.cells, &self.origins, &self.joining, drive)?;
+        plane.remesh(&mut self.cells, &self.origins, &self.series, drive)?;
         self.changed();
         Ok(true)
     }
@@ -339,9 +340,9 @@ impl Refiner {
     }
 
     fn change(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<(), Diverged> {
-        let Self { cells, origins, joining, .. } = self;
+        let Self { cells, origins, series, .. } = self;
         let (mesh, rod, before, state) = stepper.remesh(cells);
-        transfer((cells, before), (origins, joining), (mesh, state), rod);
+        transfer((cells, before), (origins, series), (mesh, state), rod);
         if let Err(diverged) = stepper.accelerate(boundary) {
             stepper.undo_remesh(cells);
             return Err(diverged);
@@ -356,15 +357,14 @@ impl Refiner {
     }
 }
 
-/// What the curvature of the law misses at the first node of a cell, by the balance of moments.
-fn missed(rule: &Gauss, rod: &Rod, state: &State, cell: usize) -> Vec3 {
-    let at_points = lane(rule.stages, |k| bend(rod, &state.points[cell * rule.stages + k]));
-    bend(rod, &state.nodes[cell]) - sum(&rule.through(0.0), &at_points)
-}
-
 /// K⁻¹ Rᵀm.
 fn bend(rod: &Rod, section: &Section) -> Vec3 {
     section.rotation.tr_mul(&section.moment).component_div(&rod.stiffness)
+}
+
+/// The same at the points of a cell.
+fn bend_at_points(rod: &Rod, state: &State, stages: usize, cell: usize) -> Lane {
+    lane(stages, |k| bend(rod, &state.points[cell * stages + k]))
 }
 
 type Lane = [Vec3; MAX_STAGES];
@@ -461,7 +461,7 @@ fn spin(omega: &Vec3, phi: &Vec3, phi_t: &Vec3) -> Vec3 {
 /// the rate of that what it was. All but the accelerations follow.
 fn transfer(
     before: (&[Cell], &State),
-    (origins, joining): (&[Origin], &Joining),
+    (origins, series): (&[Origin], &Series),
     (mesh, state): (&Mesh, &mut State),
     rod: &Rod,
 ) {
@@ -481,7 +481,7 @@ fn transfer(
             _ => {
                 let at = |k: usize| {
                     if let Some(next) = &next {
-                        let [here, there] = joining.weights.map(|weights| weights[k]);
+                        let [here, there] = series.joined.map(|weights| weights[k]);
                         let joined = |of: fn(&Shape) -> &Lane| sum(&here, of(&shape)) + sum(&there, of(next));
                         return (joined(|shape| &shape.kappa), joined(|shape| &shape.kappa_t));
                     }
@@ -490,7 +490,8 @@ fn transfer(
                     // at a release moments are balanced that have not bent the rod yet
                     let bent = |kappa: &Vec3| (kappa - before.0[first].kappa_rest).norm();
                     let most = shape.kappa[..stages].iter().map(bent).fold(0.0, larger);
-                    let missed = missed(rule, rod, old, first);
+                    let balanced = bend(rod, &old.nodes[first]);
+                    let missed = balanced - sum(&series.start, &bend_at_points(rod, old, stages, first));
                     let beside = missed * (rule.beside(theta) * (most / missed.norm()).min(1.0));
                     (sum(&through, &shape.kappa) + beside, sum(&through, &shape.kappa_t))
                 };
