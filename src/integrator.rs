@@ -41,9 +41,9 @@ const CHANGE: (f64, f64) = (0.2, 4.0);
 
 /// Estimated error of the steps in the time that gravity or stiffness take to move the whole rod, over the tolerance; in
 /// space. A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
-const SPACE_SHARE: f64 = 0.2;
+const SPACE_SHARE: f64 = 0.5;
 /// The same in a plane.
-const PLANE_SHARE: f64 = 0.5;
+const PLANE_SHARE: f64 = 1.0;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
@@ -66,7 +66,7 @@ const ROUNDINGS: f64 = 1e-12;
 
 /// Energy that a step may gain, relative, over the error it may have: those that follow the motion gain up to 10
 /// times that, those that pass the end of a rotation vector 1000 times and more.
-const GAIN: f64 = 30.0;
+const GAIN: f64 = 12.0;
 
 /// How a rod is to be moved.
 #[derive(Clone, Copy, Debug, PartialEq)]

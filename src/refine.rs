@@ -48,7 +48,7 @@ type Vec3 = Vector3<f64>;
 const CALIBRATION: f64 = 2.0;
 /// Part of the tolerance that the cells may use up before they are halved: with a quarter a whip of 25 halvings in a
 /// second raised waves that asked for ever more.
-const SHARE: f64 = 0.05;
+const SHARE: f64 = 0.15;
 /// Part of that which a pair of cells must keep below once joined.
 const JOINED: f64 = 0.001;
 /// Calls without a change after one: the waves that it has raised are to fade.

@@ -430,18 +430,17 @@ impl Parameters {
             + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
-        let wound = turn + inputs.tip_moment.norm() * self.length / softest;
+        let wound = inputs.tip_moment.norm() * self.length / softest;
         let order = 2.0 * stages as f64;
         let likely = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
         let likely = likely.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS);
         if self.extensible || self.step > 0.0 || self.quasi_static {
-            return Ok((uniform(likely as usize), None));
+            return Ok((uniform(likely.max(turn) as usize), None));
         }
-        let coarsest = uniform(((turn / COARSEST_TURN).ceil() as usize).max(1));
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely) as usize);
-        // at rest the shape shows what it takes; a release begins with waves that it does not show
-        let begin = if self.start_in_equilibrium { coarsest } else { refiner.start(likely as usize) };
-        Ok((begin, Some(refiner)))
+        let coarsest = uniform((0.5 * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)) as usize);
+        // the motion to come is not seen at the start
+        Ok((refiner.start(likely as usize), Some(refiner)))
     }
 
     /// The shortest time in which gravity or stiffness move the whole rod, s.
