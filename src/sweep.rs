@@ -412,6 +412,8 @@ impl fmt::Display for Singular {
     }
 }
 
+impl std::error::Error for Singular {}
+
 /// One number for each of the `K` Gauss points of a cell.
 type Lanes<const K: usize> = [f64; K];
 /// A matrix for each of them, entry by entry.

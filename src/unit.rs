@@ -413,7 +413,7 @@ impl Parameters {
     ///
     /// # Errors
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
-    fn mesh(&self, rod: &Rod, inputs: &Inputs, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
+    fn mesh(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
         let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
         let turn = self.rest_curvature.norm() * self.length;
         let uniform = |cells: usize| Mesh::uniform(self.length, cells, stages, self.rest_curvature);
@@ -427,10 +427,10 @@ impl Parameters {
         // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five cells of
         // four points are right to 3e-4
         let load = rod.mass_per_length * self.gravity.norm()
-            + (rod.tip_mass * self.gravity.norm() + inputs.tip_force.norm()) / self.length;
+            + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
-        let wound = inputs.tip_moment.norm() * self.length / softest;
+        let wound = boundary.tip_moment.norm() * self.length / softest;
         let order = 2.0 * stages as f64;
         let likely = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
         let likely = likely.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS);
@@ -455,6 +455,34 @@ impl Parameters {
     fn longest_step(&self, rod: &Rod, tolerance: f64) -> f64 {
         // measured on a rope and on a wire: 1/80 of that time gives 3e-4 to 7e-4 of the length
         if self.step > 0.0 { self.step } else { self.time(rod) / 80.0 * (tolerance / 1e-3).sqrt() }
+    }
+
+    /// The rod of allowed parameters, started under `boundary`, to be moved to `tolerance` unless they say otherwise.
+    ///
+    /// # Errors
+    /// [`Error`] names the parameter that is not allowed together with others, or says why there is no start.
+    pub fn start(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
+        let rod = self.rod();
+        let (mesh, mut refiner) = self.mesh(&rod, boundary, tolerance)?;
+        let (way, step) = (self.way(&rod, tolerance), self.longest_step(&rod, tolerance));
+        let state = State::at_rest_shape(&mesh, &boundary.base);
+        let mut stepper = Stepper::new(mesh, rod, state);
+        if self.start_in_equilibrium || self.quasi_static {
+            let found = match &mut refiner {
+                Some(refiner) => {
+                    stepper.reserve(refiner.most_cells());
+                    refiner.equilibrium(&mut stepper, boundary)
+                }
+                None => stepper.equilibrium(boundary),
+            };
+            found.map_err(Error::NoEquilibrium)?;
+            let lowest = modes::modes(&mut stepper, boundary, 1).map_err(Error::NoEquilibrium)?;
+            if let Some(mode) = lowest.iter().find(|mode| mode.omega_squared <= 0.0) {
+                return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
+            }
+        }
+        let scheme = Scheme::from_spectral_radius(self.spectral_radius);
+        Integrator::new(stepper, refiner, way, scheme, step, boundary).map_err(Error::NoStart)
     }
 
     fn way(&self, rod: &Rod, tolerance: f64) -> Way {
@@ -535,9 +563,6 @@ impl Unit {
         inputs.validate()?;
         let given = |value: &f64| value.is_finite() && *value > 0.0;
         let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
-        let rod = parameters.rod();
-        let (mesh, mut refiner) = parameters.mesh(&rod, inputs, tolerance)?;
-        let (way, step) = (parameters.way(&rod, tolerance), parameters.longest_step(&rod, tolerance));
         let path = Path::new(
             match parameters.base_motion {
                 0 => Given::PoseAndTwist,
@@ -551,28 +576,11 @@ impl Unit {
             tip_moment: inputs.tip_moment,
             ..Boundary::hanging_from(*path.base(), parameters.gravity)
         };
-
-        let state = State::at_rest_shape(&mesh, &boundary.base);
-        let mut stepper = Stepper::new(mesh, rod, state);
-        if parameters.start_in_equilibrium || parameters.quasi_static {
-            let found = match &mut refiner {
-                Some(refiner) => {
-                    stepper.reserve(refiner.most_cells());
-                    refiner.equilibrium(&mut stepper, &boundary)
-                }
-                None => stepper.equilibrium(&boundary),
-            };
-            found.map_err(Error::NoEquilibrium)?;
-            let lowest = modes::modes(&mut stepper, &boundary, 1).map_err(Error::NoEquilibrium)?;
-            if let Some(mode) = lowest.iter().find(|mode| mode.omega_squared <= 0.0) {
-                return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
-            }
-        }
-        let scheme = Scheme::from_spectral_radius(parameters.spectral_radius);
-        let integrator = Integrator::new(stepper, refiner, way, scheme, step, &boundary).map_err(Error::NoStart)?;
+        let integrator = parameters.start(&boundary, tolerance)?;
         let mut unit = Self {
             integrator,
-            step: (way == Way::Equal).then_some(step),
+            step: (parameters.step > 0.0 || parameters.extensible)
+                .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
             gravity: parameters.gravity,
             path,
             warned: false,

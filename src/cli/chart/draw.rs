@@ -2,7 +2,7 @@
 
 use super::Chart;
 use super::front::{Kind, Measure, Point, codes, front};
-use crate::cli::page::{Area, Fallible, INK, PALE, Page, RED, line, px, text};
+use crate::cli::page::{Area, BLUE, Fallible, GREEN, INK, ORANGE, PALE, Page, RED, VIOLET, line, px, text};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::error::Error;
@@ -379,5 +379,71 @@ pub fn overview(charts: &[Chart], others: &[Point]) -> Result<Page, Box<dyn Erro
             top += block(charts.len());
         }
         Ok(())
+    })
+}
+
+/// What the unit makes of a tolerance: the error over it, and its CPU time over that of the cheapest grid which is as
+/// accurate as asked.
+pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
+    const SIZE: f64 = 12.0;
+    let (width, top, height) = (1000.0, 84.0, 320.0);
+    let colors = [RED, BLUE, GREEN, ORANGE, VIOLET, GREY, INK];
+    let shapes = [Shape::Disc, Shape::Square, Shape::Triangle, Shape::Diamond, Shape::Cross];
+    let error: fn(&Chart, f64, &Point) -> Option<f64> = |_, tolerance, point| Some(point.tip_error? / tolerance);
+    let cost: fn(&Chart, f64, &Point) -> Option<f64> = |chart, tolerance, point| {
+        let fixed = chart.outcome.points.iter().filter(|point| point.tolerance.is_none());
+        let enough = fixed.filter(|point| point.tip_error.is_some_and(|error| error <= tolerance));
+        Some(point.cpu / enough.map(|point| point.cpu).min_by(f64::total_cmp)?)
+    };
+    Page::draw(width as u32, (top + height + 84.0) as u32, |page| {
+        text(page, "What the unit makes of a tolerance", (24.0, 22.0), 19.0, INK, HPos::Left)?;
+        let panels = [
+            ("error of the tip over the tolerance", error, (-4, 1), 3.0),
+            ("CPU time over that of the cheapest cells and steps which meet it", cost, (-2, 1), 2.0),
+        ];
+        for (number, (title, value, range, bound)) in panels.into_iter().enumerate() {
+            let axes = Axes { time: (-6, -2), error: range };
+            let left = 62.0 + 490.0 * number as f64;
+            let panel = Panel { area: page, axes, left, top, width: 410.0, height };
+            text(page, title, (left - 40.0, top - 18.0), SIZE + 1.0, INK, HPos::Left)?;
+            let above = [(px(left), px(top)), (px(left + panel.width), px(panel.y(bound)))];
+            page.draw(&Rectangle::new(above, FOG.filled()))?;
+            for decade in axes.time.0..=axes.time.1 {
+                let x = panel.x(10f64.powi(decade));
+                panel.stroke((x, top), (x, top + height), line(GRID, 0.8))?;
+                text(page, &power(decade), (x, top + height + 13.0), SIZE, INK, HPos::Center)?;
+            }
+            for decade in range.0..=range.1 {
+                let y = panel.y(10f64.powi(decade));
+                panel.stroke((left, y), (left + panel.width, y), line(PALE, 0.8))?;
+                text(page, &power(decade), (left - 5.0, y), SIZE, INK, HPos::Right)?;
+            }
+            text(page, "tolerance", (left + 205.0, top + height + 32.0), SIZE, INK, HPos::Center)?;
+            for (k, chart) in charts.iter().enumerate() {
+                let (color, shape) = (colors[k % colors.len()], shapes[k % shapes.len()]);
+                let known = chart.outcome.reference.uncertainty(Measure::Tip);
+                let (low, high) = (10f64.powi(range.0), 10f64.powi(range.1));
+                let places: Vec<_> = chart
+                    .outcome
+                    .points
+                    .iter()
+                    .filter_map(|point| Some((point.tolerance.filter(|tolerance| *tolerance >= 3.0 * known)?, point)))
+                    .filter_map(|(tolerance, point)| {
+                        let value = value(chart, tolerance, point)?.clamp(low, high);
+                        Some((panel.x(tolerance), panel.y(value)))
+                    })
+                    .collect();
+                stroke(page, &places, line(color, 1.4))?;
+                for place in &places {
+                    mark(page, *place, shape, color, 3.4)?;
+                }
+                if number == 0 {
+                    let at = (40.0 + 135.0 * k as f64, top + height + 62.0);
+                    mark(page, at, shape, color, 4.0)?;
+                    text(page, &chart.name, (at.0 + 10.0, at.1), SIZE, INK, HPos::Left)?;
+                }
+            }
+        }
+        text(page, "shaded: more than 3 times the tolerance, or twice the time", (24.0, 44.0), 12.5, GREY, HPos::Left)
     })
 }

@@ -4,7 +4,9 @@ use super::scenes::Scene;
 use crate::cli::simulate::Experiment;
 use cosserat_rod::alpha::Scheme;
 use cosserat_rod::mesh::Mesh;
+use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::State;
+use cosserat_rod::rosenbrock::{RODAS4, RODAS5P, Rosenbrock};
 use cosserat_rod::stepper::{Diverged, Stepper};
 use cosserat_rod::unit::Parameters;
 use cpu_time::ProcessTime;
@@ -42,6 +44,8 @@ pub struct Run {
     pub setting: String,
     /// Of the process for the steps, s.
     pub cpu: f64,
+    /// Whether it ended in a plane.
+    pub planar: bool,
     pub tip: Vec<Vec3>,
     /// On the base.
     pub reaction: Vec<Vec3>,
@@ -66,17 +70,37 @@ pub struct Method<'a> {
     pub solve: Solve<'a>,
 }
 
-/// Those of the built-in scenes: the library under exact motions and loads. The grids of the first give the reference
-/// where there is no other.
+/// Those of the built-in scenes, under exact motions and loads: the library on grids, and left to itself as the unit leaves
+/// it. The grids of the first give the reference where there is no other.
 pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     let Parameters { length, rest_curvature, .. } = scene.parameters();
     let grids = grids(&cell_counts(length * rest_curvature.norm()), &STAGES);
-    let solve = move |resolution| of_grid(scene, resolution, generalised_alpha);
-    let runge_kutta = move |resolution| of_grid(scene, resolution, fourth_order);
-    vec![
-        Method { code: "cosserat-rod order 2", resolutions: grids.clone(), solve: Box::new(solve) },
-        Method { code: "cosserat-rod order 4", resolutions: grids, solve: Box::new(runge_kutta) },
-    ]
+    let spatial = |code, step: SpatialStep| Method {
+        code,
+        resolutions: grids.clone(),
+        solve: Box::new(move |resolution| of_grid(scene, resolution, step)),
+    };
+    let planar = |code, method| Method {
+        code,
+        resolutions: grids.clone(),
+        solve: Box::new(move |resolution| of_plane_grid(scene, resolution, method)),
+    };
+    let mut methods =
+        vec![spatial("cosserat-rod order 2", generalised_alpha), spatial("cosserat-rod order 4", fourth_order)];
+    let start = scene.drive(0.0);
+    let mesh = Mesh::uniform(length, 1, 1, rest_curvature);
+    let whole = [0.0, 0.3, 0.7, 1.0].map(|part| scene.drive(part * scene.duration()));
+    if Plane::of(&mesh, &scene.rod(), &start, &RODAS4).is_some_and(|plane| whole.iter().all(|drive| plane.holds(drive)))
+    {
+        methods.push(planar("cosserat-rod plane, order 4", &RODAS4));
+        methods.push(planar("cosserat-rod plane, order 5", &RODAS5P));
+    }
+    methods.push(Method {
+        code: "cosserat-rod to a tolerance",
+        resolutions: tolerances(&TOLERANCES),
+        solve: Box::new(move |resolution| of_tolerance(scene, resolution)),
+    });
+    methods
 }
 
 /// Those of a rod of the user's own: the unit. What is set stays as it is.
@@ -151,12 +175,11 @@ fn digits(value: f64) -> String {
     if (1e-3..1e4).contains(&rounded) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
-/// A run of a built-in scene on a grid.
-fn of_grid(
-    scene: Scene,
-    resolution: Resolution,
-    advance: impl Fn(&mut Stepper, Scene, f64, f64) -> Result<(), Diverged>,
-) -> Result<Run, Box<dyn Error>> {
+/// A step of so many seconds from a time on.
+type SpatialStep = fn(&mut Stepper, Scene, f64, f64) -> Result<(), Diverged>;
+
+/// A run of a built-in scene on a grid in space.
+fn of_grid(scene: Scene, resolution: Resolution, advance: SpatialStep) -> Result<Run, Box<dyn Error>> {
     let Resolution::Grid { cells, stages, parts } = resolution else {
         return Err(format!("{resolution} is not a grid").into());
     };
@@ -196,6 +219,68 @@ fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Re
     Ok(())
 }
 
+/// The same in a plane.
+fn of_plane_grid(scene: Scene, resolution: Resolution, method: &'static Rosenbrock) -> Result<Run, Box<dyn Error>> {
+    let Resolution::Grid { cells, stages, parts } = resolution else {
+        return Err(format!("{resolution} is not a grid").into());
+    };
+    let start = scene.drive(0.0);
+    let Parameters { length, rest_curvature, .. } = scene.parameters();
+    let mesh = Mesh::uniform(length, cells, stages, rest_curvature);
+    let mut stepper = Stepper::new(mesh.clone(), scene.rod(), State::at_rest_shape(&mesh, &start.boundary.base));
+    if scene.starts_at_rest() {
+        stepper.equilibrium(&start.boundary)?;
+    }
+    let mut plane = Plane::new(&mesh, &scene.rod(), method);
+    if !plane.enter(&stepper.state, &start) {
+        return Err("it does not lie in a plane".into());
+    }
+    plane.start(&start)?;
+    let step = scene.duration() / (SAMPLES * parts) as f64;
+    let mut run = Run { setting: grid(cells, stages, step), planar: true, ..Run::default() };
+    run.sample(&plane.tip().position, &plane.reaction().0);
+    let clock = ProcessTime::now();
+    for k in 0..SAMPLES * parts {
+        let time = k as f64 * step;
+        plane.attempt(&|since| scene.drive(time + since), step)?;
+        plane.accept();
+        if (k + 1) % parts == 0 {
+            plane.look(1.0, &scene.drive(time + step));
+            run.sample(&plane.tip().position, &plane.reaction().0);
+        }
+    }
+    run.cpu = clock.elapsed().as_secs_f64();
+    if run.tip.iter().chain(&run.reaction).any(|sample| !sample.norm().is_finite()) {
+        return Err("a number is not finite".into());
+    }
+    Ok(run)
+}
+
+/// As the unit moves it, with the samples as communication points.
+fn of_tolerance(scene: Scene, resolution: Resolution) -> Result<Run, Box<dyn Error>> {
+    let Resolution::Tolerance(tolerance) = resolution else {
+        return Err(format!("{resolution} is not a tolerance").into());
+    };
+    let mut rod = scene.parameters().start(&scene.boundary(0.0), tolerance)?;
+    let mut run = Run { setting: resolution.to_string(), ..Run::default() };
+    let ends = rod.ends();
+    run.sample(&ends.position, &ends.force);
+    let interval = scene.duration() / SAMPLES as f64;
+    let mut cells = rod.cells();
+    let clock = ProcessTime::now();
+    for k in 0..SAMPLES {
+        let begin = k as f64 * interval;
+        rod.advance(&|since| scene.drive(begin + since), interval).map_err(|failed| failed.cause)?;
+        let ends = rod.ends();
+        run.sample(&ends.position, &ends.force);
+        cells = cells.max(rod.cells());
+    }
+    run.cpu = clock.elapsed().as_secs_f64();
+    run.planar = rod.effort().planar;
+    run.setting = format!("{resolution}: cells<={cells}");
+    Ok(run)
+}
+
 /// The unit, sampled at its communication points.
 fn simulate(experiment: &Experiment, parameters: &Parameters, resolution: Resolution) -> Result<Run, Box<dyn Error>> {
     let mut run = Run::default();
@@ -203,14 +288,14 @@ fn simulate(experiment: &Experiment, parameters: &Parameters, resolution: Resolu
     // it has told its warnings when it ran for its own sake
     experiment.run(parameters, |_, outputs, _| {
         run.sample(&outputs.tip_position, &outputs.base_reaction_force);
-        cells = outputs.cells;
+        (cells, run.planar) = (outputs.cells.max(cells), outputs.solver.planar);
         let clock = *clock.get_or_insert_with(ProcessTime::now);
         run.cpu = clock.elapsed().as_secs_f64();
         Ok(())
     })?;
     run.setting = match resolution {
         Resolution::Grid { cells, stages, .. } => grid(cells, stages, parameters.step),
-        Resolution::Tolerance(_) => format!("{resolution}: cells={cells}"),
+        Resolution::Tolerance(_) => format!("{resolution}: cells<={cells}"),
     };
     Ok(run)
 }

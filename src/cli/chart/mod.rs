@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Where to write a picture of all scenes that were run, SVG or (where the name ends in .png) PNG.
     #[arg(long, value_name = "FILE")]
     overview: Option<PathBuf>,
+    /// Where to write a picture of how the tolerances were met, and at what cost.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
 }
 
 /// Where tables and pictures go.
@@ -97,6 +100,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     if let Some(path) = &arguments.overview {
         draw::overview(&charts, &others)?.write(path)?;
+        writeln!(io::stdout(), "{}", path.display())?;
+    }
+    if let Some(path) = &arguments.calibration {
+        draw::calibration(&charts)?.write(path)?;
         writeln!(io::stdout(), "{}", path.display())?;
     }
     Ok(())

@@ -321,7 +321,7 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
         points.push(Point {
             scene: problem.name.clone(),
             code: problem.methods[*method].code.to_owned(),
-            kind: "spatial".to_owned(),
+            kind: if run.planar { "planar" } else { "spatial" }.to_owned(),
             setting: run.setting.clone(),
             cpu: run.cpu,
             tip_error: Some(errors.tip),
