@@ -926,27 +926,27 @@ impl Equations<'_> {
                 let forward = a[k].map(|a| h * a);
                 let backward: [f64; MAX_STAGES] = std::array::from_fn(|l| h * (a[k][l] - b[l]));
                 system.residuals.points[first + k] = PointResiduals {
-                    log: summed(log[k], &forward, &g),
-                    w: summed(self.accumulated(&points[k]) - w_0, &forward, &w_s),
-                    n: summed(points[k].force - node_1.force, &backward, &n_s),
-                    p: summed(p[k] - p_1, &backward, &p_s),
+                    log: log[k] - summed(Vec3::zeros(), &forward, &g),
+                    w: self.accumulated(&points[k]) - summed(w_0, &forward, &w_s),
+                    n: points[k].force - summed(node_1.force, &backward, &n_s),
+                    p: p[k] - summed(p_1, &backward, &p_s),
                 };
             }
             let (forward, backward) = (b.map(|b| h * b), b.map(|b| -h * b));
             system.residuals.cells[j] = EndResiduals {
-                log: summed(log_1, &forward, &g),
-                w: summed(self.accumulated(node_1) - w_0, &forward, &w_s),
-                n: summed(node_0.force - node_1.force, &backward, &n_s),
-                m: summed(node_0.moment - node_1.moment, &backward, &m_s),
+                log: log_1 - summed(Vec3::zeros(), &forward, &g),
+                w: self.accumulated(node_1) - summed(w_0, &forward, &w_s),
+                n: node_0.force - summed(node_1.force, &backward, &n_s),
+                m: node_0.moment - summed(node_1.moment, &backward, &m_s),
             };
         }
     }
 }
 
-/// x − Σ weights_l slopes_l.
+/// x + Σ weights_l slopes_l.
 #[inline(always)]
 fn summed<const K: usize>(x: Vec3, weights: &[f64; MAX_STAGES], slopes: &[Vec3; K]) -> Vec3 {
-    (0..K).fold(x, |rest, l| rest - slopes[l] * weights[l])
+    (0..K).fold(x, |sum, l| sum + slopes[l] * weights[l])
 }
 
 /// Residuals and blocks at an iterate.
