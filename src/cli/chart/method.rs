@@ -7,7 +7,7 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::State;
 use cosserat_rod::rosenbrock::{RODAS4, RODAS5P, Rosenbrock};
-use cosserat_rod::stepper::{Diverged, Stepper};
+use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::Parameters;
 use cpu_time::ProcessTime;
 use nalgebra::Vector3;
@@ -22,8 +22,8 @@ pub const SAMPLES: usize = 100;
 /// How finely a rod is resolved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
-    /// Equal cells, and equal steps of which so many make an interval between samples.
-    Grid { cells: usize, stages: usize, parts: usize },
+    /// Equal cells, and so many equal steps in all.
+    Grid { cells: usize, stages: usize, steps: usize },
     /// Whatever the unit chooses for it.
     Tolerance(f64),
 }
@@ -31,7 +31,7 @@ pub enum Resolution {
 impl fmt::Display for Resolution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Grid { cells, stages, parts } => write!(f, "cells={cells} stages={stages}, {parts} steps a sample"),
+            Self::Grid { cells, stages, steps } => write!(f, "cells={cells} stages={stages}, {steps} steps"),
             Self::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
         }
     }
@@ -52,6 +52,13 @@ pub struct Run {
 }
 
 impl Run {
+    /// With a first sample.
+    fn from(mut self, (tip, reaction): (Vec3, Vec3)) -> Self {
+        self.tip.insert(0, tip);
+        self.reaction.insert(0, reaction);
+        self
+    }
+
     fn sample(&mut self, tip: &Vec3, reaction: &Vec3) {
         self.tip.push(*tip);
         self.reaction.push(*reaction);
@@ -74,19 +81,26 @@ pub struct Method<'a> {
 /// it. The grids of the first give the reference where there is no other.
 pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     let Parameters { length, rest_curvature, .. } = scene.parameters();
-    let grids = grids(&cell_counts(length * rest_curvature.norm()), &STAGES);
-    let spatial = |code, step: SpatialStep| Method {
-        code,
-        resolutions: grids.clone(),
-        solve: Box::new(move |resolution| of_grid(scene, resolution, step)),
-    };
+    let cells = cell_counts(length * rest_curvature.norm());
+    let to_samples = grids(&cells, &STAGES, refinements(SAMPLES));
+    let dense = grids(&cells, &STAGES, LONG_STEPS.into_iter().chain(refinements(SAMPLES)));
     let planar = |code, method| Method {
         code,
-        resolutions: grids.clone(),
+        resolutions: dense.clone(),
         solve: Box::new(move |resolution| of_plane_grid(scene, resolution, method)),
     };
-    let mut methods =
-        vec![spatial("cosserat-rod order 2", generalised_alpha), spatial("cosserat-rod order 4", fourth_order)];
+    let mut methods = vec![
+        Method {
+            code: "cosserat-rod order 2",
+            resolutions: to_samples,
+            solve: Box::new(move |resolution| of_grid(scene, resolution, generalised_alpha)),
+        },
+        Method {
+            code: "cosserat-rod order 4",
+            resolutions: dense.clone(),
+            solve: Box::new(move |resolution| of_grid(scene, resolution, fourth_order)),
+        },
+    ];
     let start = scene.drive(0.0);
     let mesh = Mesh::uniform(length, 1, 1, rest_curvature);
     let whole = [0.0, 0.3, 0.7, 1.0].map(|part| scene.drive(part * scene.duration()));
@@ -108,16 +122,14 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
     let given = &experiment.parameters;
     let fixed = |value: i32, otherwise: Vec<usize>| if value > 0 { vec![value as usize] } else { otherwise };
     let cells = fixed(given.cells, cell_counts(given.length * given.rest_curvature.norm()));
-    let mut grids = grids(&cells, &fixed(given.stages, STAGES.to_vec()));
-    if given.step > 0.0 {
-        grids.retain(|resolution| matches!(resolution, Resolution::Grid { parts: 1, .. }));
-    }
+    let samples = experiment.steps().max(1);
+    let steps = refinements(samples).take(if given.step > 0.0 { 1 } else { usize::MAX });
+    let grids = grids(&cells, &fixed(given.stages, STAGES.to_vec()), steps);
     let tolerances = if given.tolerance > 0.0 { tolerances(&[given.tolerance]) } else { tolerances(&TOLERANCES) };
-    let interval = experiment.duration() / experiment.steps().max(1) as f64;
     let solve = move |resolution| {
         let parameters = match resolution {
-            Resolution::Grid { cells, stages, parts } => {
-                let step = if given.step > 0.0 { given.step } else { interval / parts as f64 };
+            Resolution::Grid { cells, stages, steps } => {
+                let step = if given.step > 0.0 { given.step } else { experiment.duration() / steps as f64 };
                 Parameters { cells: cells as i32, stages: stages as i32, step, ..given.clone() }
             }
             Resolution::Tolerance(tolerance) => Parameters { tolerance, ..given.clone() },
@@ -128,7 +140,9 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
 }
 
 /// Displacement over the length that an iteration of a stage need not resolve.
-const STAGE_ACCURACY: f64 = 1e-6;
+const STAGE_ACCURACY: f64 = 1e-7;
+/// Steps over a built-in scene that are longer than its samples lie apart, which are then seen within the steps.
+const LONG_STEPS: [usize; 5] = [5, 10, 20, 25, 50];
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 const STAGES: [usize; 3] = [1, 2, 4];
 /// Most cells, and twice as many as a wound rod needs at least.
@@ -153,12 +167,16 @@ fn cell_counts(turn: f64) -> Vec<usize> {
     sizes().take_while(|&cells| cells <= CELLS.max(4 * least)).filter(|&cells| cells >= least).collect()
 }
 
-fn grids(cells: &[usize], stages: &[usize]) -> Vec<Resolution> {
+/// Steps that end on the samples.
+fn refinements(samples: usize) -> impl Iterator<Item = usize> + Clone {
+    (0..=HALVINGS).map(move |halvings| samples << halvings)
+}
+
+fn grids(cells: &[usize], stages: &[usize], all_steps: impl Iterator<Item = usize> + Clone) -> Vec<Resolution> {
     let mut grids = Vec::new();
     for &cells in cells {
         for &stages in stages {
-            let halvings = (0..=HALVINGS).map(|halvings| 1 << halvings);
-            grids.extend(halvings.map(|parts| Resolution::Grid { cells, stages, parts }));
+            grids.extend(all_steps.clone().map(|steps| Resolution::Grid { cells, stages, steps }));
         }
     }
     grids
@@ -175,12 +193,43 @@ fn digits(value: f64) -> String {
     if (1e-3..1e4).contains(&rounded) { format!("{rounded}") } else { format!("{rounded:e}") }
 }
 
-/// A step of so many seconds from a time on.
-type SpatialStep = fn(&mut Stepper, Scene, f64, f64) -> Result<(), Diverged>;
+/// A rod of a scene that takes a step, and shows its tip and the force on its base at parts of it.
+type Step<R> = fn(&mut R, Scene, f64, f64) -> Result<(), Box<dyn Error>>;
+type Show<R> = fn(&mut R, Scene, f64, f64, f64) -> (Vec3, Vec3);
 
-/// A run of a built-in scene on a grid in space.
-fn of_grid(scene: Scene, resolution: Resolution, advance: SpatialStep) -> Result<Run, Box<dyn Error>> {
-    let Resolution::Grid { cells, stages, parts } = resolution else {
+/// A run in equal steps of `rod`, which stands at the start.
+fn of_steps<R>(
+    scene: Scene,
+    setting: String,
+    steps: usize,
+    rod: &mut R,
+    (advance, show): (Step<R>, Show<R>),
+) -> Result<Run, Box<dyn Error>> {
+    let step = scene.duration() / steps as f64;
+    let mut run = Run { setting, ..Run::default() };
+    // a step to several samples, or several steps to one
+    let (samples, parts) = ((SAMPLES / steps).max(1), (steps / SAMPLES).max(1));
+    let clock = ProcessTime::now();
+    for k in 0..steps {
+        let time = k as f64 * step;
+        advance(rod, scene, time, step)?;
+        if (k + 1) % parts == 0 {
+            for sample in 1..=samples {
+                let (tip, force) = show(rod, scene, time, step, sample as f64 / samples as f64);
+                run.sample(&tip, &force);
+            }
+        }
+    }
+    run.cpu = clock.elapsed().as_secs_f64();
+    if run.tip.iter().chain(&run.reaction).any(|sample| !sample.norm().is_finite()) {
+        return Err("a number is not finite".into());
+    }
+    Ok(run)
+}
+
+/// A rod of a scene in space, on a grid, at the start; its sample there, and what the grid is called.
+fn on_grid(scene: Scene, resolution: Resolution) -> Result<(Stepper, usize, String), Box<dyn Error>> {
+    let Resolution::Grid { cells, stages, steps } = resolution else {
         return Err(format!("{resolution} is not a grid").into());
     };
     let start = scene.boundary(0.0);
@@ -192,68 +241,59 @@ fn of_grid(scene: Scene, resolution: Resolution, advance: SpatialStep) -> Result
         stepper.equilibrium(&start)?;
     }
     stepper.start(&start)?;
-    let step = scene.duration() / (SAMPLES * parts) as f64;
-    let mut run = Run { setting: grid(cells, stages, step), ..Run::default() };
-    run.sample(&stepper.state.tip().position, &stepper.state.nodes[0].force);
-    let clock = ProcessTime::now();
-    for k in 0..SAMPLES * parts {
-        advance(&mut stepper, scene, k as f64 * step, step)?;
-        if (k + 1) % parts == 0 {
-            run.sample(&stepper.state.tip().position, &stepper.state.nodes[0].force);
-        }
-    }
-    run.cpu = clock.elapsed().as_secs_f64();
-    Ok(run)
+    Ok((stepper, steps, grid(cells, stages, scene.duration() / steps as f64)))
 }
 
-/// A step of the pose formulation, from `time` on.
-fn generalised_alpha(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Diverged> {
-    let scheme = Scheme::from_spectral_radius(scene.parameters().spectral_radius);
-    stepper.advance(&scene.boundary(time + step), scheme, step).map(drop)
-}
-
-/// A Runge-Kutta step of the pose formulation, from `time` on.
-fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Diverged> {
-    stepper.attempt(&|since| scene.boundary(time + since), step, STAGE_ACCURACY)?;
-    stepper.accept();
-    Ok(())
+/// A run of a built-in scene on a grid in space.
+fn of_grid(scene: Scene, resolution: Resolution, advance: Step<Stepper>) -> Result<Run, Box<dyn Error>> {
+    let (mut stepper, steps, setting) = on_grid(scene, resolution)?;
+    let seen = |state: &State| (state.tip().position, state.nodes[0].force);
+    let begin = seen(&stepper.state);
+    let show: Show<Stepper> = |stepper, scene, time, step, part| {
+        let state = match part {
+            1.0 => &stepper.state,
+            _ => stepper.look(part, &scene.boundary(time + part * step)),
+        };
+        (state.tip().position, state.nodes[0].force)
+    };
+    Ok(of_steps(scene, setting, steps, &mut stepper, (advance, show))?.from(begin))
 }
 
 /// The same in a plane.
 fn of_plane_grid(scene: Scene, resolution: Resolution, method: &'static Rosenbrock) -> Result<Run, Box<dyn Error>> {
-    let Resolution::Grid { cells, stages, parts } = resolution else {
-        return Err(format!("{resolution} is not a grid").into());
-    };
+    let (stepper, steps, setting) = on_grid(scene, resolution)?;
+    let mut plane = Plane::new(&stepper.mesh, &stepper.rod, method);
     let start = scene.drive(0.0);
-    let Parameters { length, rest_curvature, .. } = scene.parameters();
-    let mesh = Mesh::uniform(length, cells, stages, rest_curvature);
-    let mut stepper = Stepper::new(mesh.clone(), scene.rod(), State::at_rest_shape(&mesh, &start.boundary.base));
-    if scene.starts_at_rest() {
-        stepper.equilibrium(&start.boundary)?;
-    }
-    let mut plane = Plane::new(&mesh, &scene.rod(), method);
     if !plane.enter(&stepper.state, &start) {
         return Err("it does not lie in a plane".into());
     }
     plane.start(&start)?;
-    let step = scene.duration() / (SAMPLES * parts) as f64;
-    let mut run = Run { setting: grid(cells, stages, step), planar: true, ..Run::default() };
-    run.sample(&plane.tip().position, &plane.reaction().0);
-    let clock = ProcessTime::now();
-    for k in 0..SAMPLES * parts {
-        let time = k as f64 * step;
+    let begin = (plane.tip().position, plane.reaction().0);
+    let advance: Step<Plane> = |plane, scene, time, step| {
         plane.attempt(&|since| scene.drive(time + since), step)?;
         plane.accept();
-        if (k + 1) % parts == 0 {
-            plane.look(1.0, &scene.drive(time + step));
-            run.sample(&plane.tip().position, &plane.reaction().0);
-        }
-    }
-    run.cpu = clock.elapsed().as_secs_f64();
-    if run.tip.iter().chain(&run.reaction).any(|sample| !sample.norm().is_finite()) {
-        return Err("a number is not finite".into());
-    }
-    Ok(run)
+        Ok(())
+    };
+    let show: Show<Plane> = |plane, scene, time, step, part| {
+        plane.look(part, &scene.drive(time + part * step));
+        (plane.tip().position, plane.reaction().0)
+    };
+    let run = of_steps(scene, setting, steps, &mut plane, (advance, show))?.from(begin);
+    Ok(Run { planar: true, ..run })
+}
+
+/// A step of the pose formulation, from `time` on.
+fn generalised_alpha(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Box<dyn Error>> {
+    let scheme = Scheme::from_spectral_radius(scene.parameters().spectral_radius);
+    stepper.advance(&scene.boundary(time + step), scheme, step)?;
+    Ok(())
+}
+
+/// A Runge-Kutta step of the pose formulation, from `time` on.
+fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Box<dyn Error>> {
+    stepper.attempt(&|since| scene.boundary(time + since), step, STAGE_ACCURACY)?;
+    stepper.accept();
+    Ok(())
 }
 
 /// As the unit moves it, with the samples as communication points.

@@ -131,7 +131,7 @@ struct Ledger<'a, 'b> {
 /// Proportional to the time of a grid.
 fn work(resolution: Resolution) -> f64 {
     match resolution {
-        Resolution::Grid { cells, stages, parts } => (parts * (cells + 1)) as f64 * (stages as f64).powf(1.5),
+        Resolution::Grid { cells, stages, steps } => (steps * (cells + 1)) as f64 * (stages as f64).powf(1.5),
         Resolution::Tolerance(_) => f64::INFINITY,
     }
 }
@@ -206,7 +206,7 @@ impl Ledger<'_, '_> {
     /// whichever changes the result more.
     fn finest(&mut self) -> Result<Reference, Box<dyn Error>> {
         let resolutions = &self.problem.methods[0].resolutions;
-        let (cells, parts) = axes(resolutions);
+        let (cells, steps) = axes(resolutions);
         let cells: Vec<usize> = cells.into_iter().step_by(2).collect();
         let stages = resolutions.iter().filter_map(|resolution| match resolution {
             Resolution::Grid { stages, .. } => Some(*stages),
@@ -214,7 +214,7 @@ impl Ledger<'_, '_> {
         });
         let stages = stages.max().unwrap_or(1);
         let most = FOR_REFERENCE * self.budget;
-        let at = |[i, j]: [usize; 2]| Some(Resolution::Grid { cells: *cells.get(i)?, stages, parts: *parts.get(j)? });
+        let at = |[i, j]: [usize; 2]| Some(Resolution::Grid { cells: *cells.get(i)?, stages, steps: *steps.get(j)? });
 
         let mut place = [0, 0];
         // what is too coarse to be solved is refined in both
@@ -272,20 +272,20 @@ impl Ledger<'_, '_> {
     }
 }
 
-/// The cells and the parts of the grids, ascending.
+/// The cells and the steps of the grids, ascending.
 fn axes(resolutions: &[Resolution]) -> (Vec<usize>, Vec<usize>) {
-    let (mut all_cells, mut all_parts) = (Vec::new(), Vec::new());
+    let (mut all_cells, mut all_steps) = (Vec::new(), Vec::new());
     for resolution in resolutions {
-        if let Resolution::Grid { cells, parts, .. } = resolution {
+        if let Resolution::Grid { cells, steps, .. } = resolution {
             all_cells.push(*cells);
-            all_parts.push(*parts);
+            all_steps.push(*steps);
         }
     }
-    for axis in [&mut all_cells, &mut all_parts] {
+    for axis in [&mut all_cells, &mut all_steps] {
         axis.sort_unstable();
         axis.dedup();
     }
-    (all_cells, all_parts)
+    (all_cells, all_steps)
 }
 
 /// Runs what is worth it; `budget` is CPU time, s.
@@ -347,10 +347,10 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
 /// Runs the grids of a method, from the cheapest on: the coarsest ones, and what refines, in mesh or step, a run that
 /// is not far above the front.
 fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], reference: &Reference, most: f64) {
-    let (cells_axis, parts_axis) = axes(resolutions);
+    let (cells_axis, steps_axis) = axes(resolutions);
     let next = |axis: &[usize], value: usize| axis.iter().copied().find(|&other| other > value);
     let coarsest = |resolution: &Resolution| match resolution {
-        Resolution::Grid { cells, parts, .. } => cells_axis.first() == Some(cells) && parts_axis.first() == Some(parts),
+        Resolution::Grid { cells, steps, .. } => cells_axis.first() == Some(cells) && steps_axis.first() == Some(steps),
         Resolution::Tolerance(_) => false,
     };
     let mut open: Vec<Resolution> = resolutions.iter().copied().filter(coarsest).collect();
@@ -358,7 +358,7 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
     let mut closed: Vec<(f64, Errors)> = Vec::new();
     while let Some(place) = (0..open.len()).min_by(|&a, &b| work(open[a]).total_cmp(&work(open[b]))) {
         let resolution = open.swap_remove(place);
-        let Resolution::Grid { cells, stages, parts } = resolution else { continue };
+        let Resolution::Grid { cells, stages, steps } = resolution else { continue };
         if ledger.find(method, resolution).is_none() {
             ledger.take(method, resolution, most);
         }
@@ -385,8 +385,8 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
             continue;
         }
         let finer = [
-            next(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, parts }),
-            next(&parts_axis, parts).map(|parts| Resolution::Grid { cells, stages, parts }),
+            next(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, steps }),
+            next(&steps_axis, steps).map(|steps| Resolution::Grid { cells, stages, steps }),
         ];
         for finer in finer.into_iter().flatten() {
             if !seen.contains(&finer) {
