@@ -192,7 +192,7 @@ struct Planar {
     unwatched: (f64, u32),
     /// The shortest time after which it is, s.
     watch: f64,
-    /// Three of these three before the interval.
+    /// Pace, disturbance and the last of these before the interval.
     before: (Pace, Disturbance, (f64, u32)),
 }
 
