@@ -172,13 +172,15 @@ fn stretch(part: f64) -> f64 {
     (SAFETY * part.max(1e-12).powf(-1.0 / 3.0)).clamp(CHANGE.0, CHANGE.1)
 }
 
-/// How a step of generalized-α is taken.
+/// How a step without an estimate of its error is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     /// As suits it.
     Fitting,
     /// By implicit Euler and the accelerations of the positions: what cannot be followed rests, whatever the step.
     Damped,
+    /// To the equilibrium at its end.
+    Resting,
 }
 
 /// A rod that may be in a plane.
@@ -329,7 +331,7 @@ impl Integrator {
         let done = match self.way {
             Way::Accurate { .. } => self.follow(drive, duration),
             Way::Equal => self.march(drive, duration),
-            Way::Static => self.rest(drive, 0.0, duration, 0),
+            Way::Static => self.step(drive, Kind::Resting, 0.0, duration, 0),
         };
         if done.is_err() {
             self.restore();
@@ -565,7 +567,7 @@ impl Integrator {
         self.stepper.attempt(&|since: f64| drive(time + since).boundary, dt, accuracy)
     }
 
-    /// One generalized-α step from `time`, or its two halves.
+    /// One step from `time`, or its two halves.
     fn step(
         &mut self,
         drive: &impl Fn(f64) -> Drive,
@@ -578,12 +580,17 @@ impl Integrator {
         let report = match kind {
             Kind::Fitting => self.stepper.advance(&boundary, self.scheme, dt),
             Kind::Damped => self.stepper.step(&boundary, Scheme::BACKWARD_EULER, dt, Row::Positions),
+            Kind::Resting => self.stepper.drift(&boundary, dt),
         };
         match report {
             Ok(report) => {
                 self.effort.iterated(report.iterations);
-                let second = self.stepper.state.scheme.is_second_order();
-                self.effort.took(if second { 2 } else { 1 }, dt, 0.0);
+                let order = match kind {
+                    Kind::Resting => 0,
+                    _ if self.stepper.state.scheme.is_second_order() => 2,
+                    _ => 1,
+                };
+                self.effort.took(order, dt, 0.0);
                 let Stepper { mesh, rod, state, .. } = &self.stepper;
                 self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
                 Ok(())
@@ -594,27 +601,6 @@ impl Integrator {
                 self.effort.iterated(cause.iterations);
                 self.step(drive, kind, time, 0.5 * dt, halvings + 1)?;
                 self.step(drive, kind, time + 0.5 * dt, 0.5 * dt, halvings + 1)
-            }
-        }
-    }
-
-    /// The equilibrium `dt` s after `time`, by way of those in between if need be.
-    fn rest(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64, halvings: u32) -> Result<(), Failed> {
-        let boundary = drive(time + dt).boundary;
-        match self.stepper.drift(&boundary, dt) {
-            Ok(report) => {
-                self.effort.iterated(report.iterations);
-                self.effort.took(0, dt, 0.0);
-                let Stepper { mesh, rod, state, .. } = &self.stepper;
-                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
-                Ok(())
-            }
-            Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
-            Err(cause) => {
-                self.effort.retries = self.effort.retries.saturating_add(1);
-                self.effort.iterated(cause.iterations);
-                self.rest(drive, time, 0.5 * dt, halvings + 1)?;
-                self.rest(drive, time + 0.5 * dt, 0.5 * dt, halvings + 1)
             }
         }
     }
