@@ -28,8 +28,8 @@ type Vec3 = Vector3<f64>;
 
 /// Most steps chosen for an interval, in space.
 const MAX_CHOSEN_STEPS: f64 = 1000.0;
-/// The same in a plane, where they cost so little that a rod is followed however fast it moves.
-const MAX_PLANE_STEPS: f64 = 1e6;
+/// The same in a plane, where they cost so little: seconds on the cells of a rod that whips.
+const MAX_PLANE_STEPS: f64 = 1e5;
 /// Length of the next step over one that Newton has lost.
 const LOST: f64 = 0.3;
 /// Halvings of a step before it is given up.
@@ -190,8 +190,8 @@ struct Planar {
     disturbance: Disturbance,
     /// Time, s, and steps since the disturbance was carried on.
     unwatched: (f64, u32),
-    /// The shortest time after which it is, s.
-    watch: f64,
+    /// The shortest time in which gravity or stiffness move the whole rod, s.
+    time: f64,
     /// Three of these three before the interval.
     before: (Pace, Disturbance, (f64, u32)),
 }
@@ -202,7 +202,7 @@ impl Planar {
         let (time, steps) = &mut self.unwatched;
         *time += dt;
         *steps += 1;
-        *steps >= STEPS_UNWATCHED && *time >= self.watch
+        *steps >= STEPS_UNWATCHED && *time >= TIME_UNWATCHED * self.time
     }
 
     /// Carries the disturbance on to where the plane looks at, and tells whether the rod would stay in it.
@@ -211,7 +211,7 @@ impl Planar {
         if self.disturbance.size() < FADED {
             self.disturbance.begin(&self.plane, 1.0);
         }
-        self.disturbance.advance(&self.plane, time) && self.disturbance.size() < GROWN
+        self.disturbance.advance(&self.plane, time, GROWN)
     }
 }
 
@@ -295,7 +295,7 @@ impl Integrator {
                 pace,
                 disturbance: room(),
                 unwatched,
-                watch: TIME_UNWATCHED * time,
+                time,
             }
         });
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
@@ -315,7 +315,7 @@ impl Integrator {
             effort,
             state_before,
             mesh_before,
-            refiners: refiner.map(|refiner| (refiner.clone(), refiner)),
+            refiners: refiner.map(|refiner| (refiner.kept(), refiner)).map(|(kept, refiner)| (refiner, kept)),
             stepper,
         })
     }
@@ -329,7 +329,7 @@ impl Integrator {
         let done = match self.way {
             Way::Accurate { .. } => self.follow(drive, duration),
             Way::Equal => self.march(drive, duration),
-            Way::Static => self.rest(drive, 0.0, duration, 0),
+            Way::Static => self.drift(drive, duration),
         };
         if done.is_err() {
             self.restore();
@@ -340,11 +340,14 @@ impl Integrator {
     fn keep(&mut self) {
         let Self { in_plane, pace, energy, effort, .. } = *self;
         self.before = Before { in_plane, pace, energy, effort };
+        if let Some(planar) = &mut self.planar {
+            planar.before.0 = planar.pace;
+        }
         match &mut self.planar {
             Some(planar) if in_plane => {
                 planar.plane.keep(&mut planar.kept);
-                let (pace, disturbance, unwatched) = &mut planar.before;
-                (*pace, *unwatched) = (planar.pace, planar.unwatched);
+                let (_, disturbance, unwatched) = &mut planar.before;
+                *unwatched = planar.unwatched;
                 disturbance.copy_from(&planar.disturbance);
             }
             _ => {
@@ -360,11 +363,15 @@ impl Integrator {
     fn restore(&mut self) {
         let Before { in_plane, pace, energy, effort } = self.before;
         (self.in_plane, self.pace, self.energy, self.effort) = (in_plane, pace, energy, effort);
+        // a plane that the interval has entered keeps nothing of it
+        if let Some(planar) = &mut self.planar {
+            planar.pace = planar.before.0;
+        }
         match &mut self.planar {
             Some(planar) if in_plane => {
                 planar.plane.restore(&planar.kept);
-                let (pace, disturbance, unwatched) = &planar.before;
-                (planar.pace, planar.unwatched) = (*pace, *unwatched);
+                let (_, disturbance, unwatched) = &planar.before;
+                planar.unwatched = *unwatched;
                 planar.disturbance.copy_from(disturbance);
             }
             _ => self.stepper.resume(&self.mesh_before, &self.state_before),
@@ -483,7 +490,8 @@ impl Integrator {
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
                 write(&mut planar.plane, &mut self.stepper);
-                planar.disturbance.disturb(&planar.plane, ROUNDINGS, &mut self.stepper.state);
+                let most = ROUNDINGS * GROWN / planar.time;
+                planar.disturbance.disturb(&planar.plane, ROUNDINGS, most, &mut self.stepper.state);
                 self.in_plane = false;
                 break;
             }
@@ -598,6 +606,24 @@ impl Integrator {
         }
     }
 
+    /// An interval from one equilibrium to the next, in which loads and gravity go steadily to what they are to be.
+    fn drift(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        let from = self.stepper.state.boundary;
+        let steady = |time: f64| {
+            let Drive { boundary: to, rates } = drive(time);
+            let share = time / duration;
+            let between = |from: Vec3, to: Vec3| if share < 1.0 { from + (to - from) * share } else { to };
+            let boundary = Boundary {
+                tip_force: between(from.tip_force, to.tip_force),
+                tip_moment: between(from.tip_moment, to.tip_moment),
+                gravity: between(from.gravity, to.gravity),
+                ..to
+            };
+            Drive { boundary, rates }
+        };
+        self.rest(&steady, 0.0, duration, 0)
+    }
+
     /// The equilibrium `dt` s after `time`, by way of those in between if need be.
     fn rest(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64, halvings: u32) -> Result<(), Failed> {
         let boundary = drive(time + dt).boundary;
@@ -606,7 +632,13 @@ impl Integrator {
                 self.effort.iterated(report.iterations);
                 self.effort.took(0, dt, 0.0);
                 let Stepper { mesh, rod, state, .. } = &self.stepper;
-                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
+                let before = self.stepper.previous();
+                let mean = Boundary {
+                    tip_force: 0.5 * (before.boundary.tip_force + boundary.tip_force),
+                    tip_moment: 0.5 * (before.boundary.tip_moment + boundary.tip_moment),
+                    ..boundary
+                };
+                self.energy = self.energy.after(mesh, rod, before, state, &mean);
                 Ok(())
             }
             Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
