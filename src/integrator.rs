@@ -28,8 +28,8 @@ type Vec3 = Vector3<f64>;
 
 /// Most steps chosen for an interval, in space.
 const MAX_CHOSEN_STEPS: f64 = 1000.0;
-/// The same in a plane, where they cost so little that a rod is followed however fast it moves.
-const MAX_PLANE_STEPS: f64 = 1e6;
+/// The same in a plane, where they cost so little: seconds on the cells of a rod that whips.
+const MAX_PLANE_STEPS: f64 = 1e5;
 /// Length of the next step over one that Newton has lost.
 const LOST: f64 = 0.3;
 /// Halvings of a step before it is given up.
@@ -192,9 +192,9 @@ struct Planar {
     disturbance: Disturbance,
     /// Time, s, and steps since the disturbance was carried on.
     unwatched: (f64, u32),
-    /// The shortest time after which it is, s.
-    watch: f64,
-    /// Pace, disturbance and the last of these before the interval.
+    /// The shortest time in which gravity or stiffness move the whole rod, s.
+    time: f64,
+    /// Pace, disturbance and what is unwatched before the interval.
     before: (Pace, Disturbance, (f64, u32)),
 }
 
@@ -204,7 +204,7 @@ impl Planar {
         let (time, steps) = &mut self.unwatched;
         *time += dt;
         *steps += 1;
-        *steps >= STEPS_UNWATCHED && *time >= self.watch
+        *steps >= STEPS_UNWATCHED && *time >= TIME_UNWATCHED * self.time
     }
 
     /// Carries the disturbance on to where the plane looks at, and tells whether the rod would stay in it.
@@ -213,7 +213,7 @@ impl Planar {
         if self.disturbance.size() < FADED {
             self.disturbance.begin(&self.plane, 1.0);
         }
-        self.disturbance.advance(&self.plane, time) && self.disturbance.size() < GROWN
+        self.disturbance.advance(&self.plane, time, GROWN)
     }
 }
 
@@ -297,7 +297,7 @@ impl Integrator {
                 pace,
                 disturbance: room(),
                 unwatched,
-                watch: TIME_UNWATCHED * time,
+                time,
             }
         });
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
@@ -317,7 +317,7 @@ impl Integrator {
             effort,
             state_before,
             mesh_before,
-            refiners: refiner.map(|refiner| (refiner.clone(), refiner)),
+            refiners: refiner.map(|refiner| (refiner.kept(), refiner)).map(|(kept, refiner)| (refiner, kept)),
             stepper,
         })
     }
@@ -331,7 +331,7 @@ impl Integrator {
         let done = match self.way {
             Way::Accurate { .. } => self.follow(drive, duration),
             Way::Equal => self.march(drive, duration),
-            Way::Static => self.step(drive, Kind::Resting, 0.0, duration, 0),
+            Way::Static => self.drift(drive, duration),
         };
         if done.is_err() {
             self.restore();
@@ -342,11 +342,14 @@ impl Integrator {
     fn keep(&mut self) {
         let Self { in_plane, pace, energy, effort, .. } = *self;
         self.before = Before { in_plane, pace, energy, effort };
+        if let Some(planar) = &mut self.planar {
+            planar.before.0 = planar.pace;
+        }
         match &mut self.planar {
             Some(planar) if in_plane => {
                 planar.plane.keep(&mut planar.kept);
-                let (pace, disturbance, unwatched) = &mut planar.before;
-                (*pace, *unwatched) = (planar.pace, planar.unwatched);
+                let (_, disturbance, unwatched) = &mut planar.before;
+                *unwatched = planar.unwatched;
                 disturbance.copy_from(&planar.disturbance);
             }
             _ => {
@@ -362,11 +365,15 @@ impl Integrator {
     fn restore(&mut self) {
         let Before { in_plane, pace, energy, effort } = self.before;
         (self.in_plane, self.pace, self.energy, self.effort) = (in_plane, pace, energy, effort);
+        // a plane that the interval has entered keeps nothing of it
+        if let Some(planar) = &mut self.planar {
+            planar.pace = planar.before.0;
+        }
         match &mut self.planar {
             Some(planar) if in_plane => {
                 planar.plane.restore(&planar.kept);
-                let (pace, disturbance, unwatched) = &planar.before;
-                (planar.pace, planar.unwatched) = (*pace, *unwatched);
+                let (_, disturbance, unwatched) = &planar.before;
+                planar.unwatched = *unwatched;
                 planar.disturbance.copy_from(disturbance);
             }
             _ => self.stepper.resume(&self.mesh_before, &self.state_before),
@@ -485,7 +492,8 @@ impl Integrator {
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
                 write(&mut planar.plane, &mut self.stepper);
-                planar.disturbance.disturb(&planar.plane, ROUNDINGS, &mut self.stepper.state);
+                let most = ROUNDINGS * GROWN / planar.time;
+                planar.disturbance.disturb(&planar.plane, ROUNDINGS, most, &mut self.stepper.state);
                 self.in_plane = false;
                 break;
             }
@@ -592,7 +600,18 @@ impl Integrator {
                 };
                 self.effort.took(order, dt, 0.0);
                 let Stepper { mesh, rod, state, .. } = &self.stepper;
-                self.energy = self.energy.after(mesh, rod, self.stepper.previous(), state, &boundary);
+                let before = self.stepper.previous();
+                let mean = |from: Vec3, to: Vec3| 0.5 * (from + to);
+                // loads that are held over a step, or go steadily
+                let worked = match kind {
+                    Kind::Resting => Boundary {
+                        tip_force: mean(before.boundary.tip_force, boundary.tip_force),
+                        tip_moment: mean(before.boundary.tip_moment, boundary.tip_moment),
+                        ..boundary
+                    },
+                    Kind::Fitting | Kind::Damped => boundary,
+                };
+                self.energy = self.energy.after(mesh, rod, before, state, &worked);
                 Ok(())
             }
             Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
@@ -603,6 +622,24 @@ impl Integrator {
                 self.step(drive, kind, time + 0.5 * dt, 0.5 * dt, halvings + 1)
             }
         }
+    }
+
+    /// An interval from one equilibrium to the next, in which loads and gravity go steadily to what they are to be.
+    fn drift(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        let from = self.stepper.state.boundary;
+        let steady = |time: f64| {
+            let Drive { boundary: to, rates } = drive(time);
+            let share = time / duration;
+            let between = |from: Vec3, to: Vec3| if share < 1.0 { from + (to - from) * share } else { to };
+            let boundary = Boundary {
+                tip_force: between(from.tip_force, to.tip_force),
+                tip_moment: between(from.tip_moment, to.tip_moment),
+                gravity: between(from.gravity, to.gravity),
+                ..to
+            };
+            Drive { boundary, rates }
+        };
+        self.step(&steady, Kind::Resting, 0.0, duration, 0)
     }
 
     /// The ends of the rod at present.

@@ -108,12 +108,12 @@ impl Disturbance {
         self.points.iter().map(|point| point.value.yz().norm()).fold(0.0, f64::max)
     }
 
-    /// Carries it on by `time` s, with the forces and moments of `plane` where that looks at. Whether it can be followed;
-    /// otherwise it has grown beyond all bounds.
-    pub fn advance(&mut self, plane: &Plane, time: f64) -> bool {
+    /// Carries it on by `time` s, with the forces and moments of `plane` where that looks at, as long as it is smaller than
+    /// `most`. Whether it is to the end; otherwise it has grown as far as that, or within the shortest step.
+    pub fn advance(&mut self, plane: &Plane, time: f64, most: f64) -> bool {
         let mut halvings = 0;
         let mut left = 1u32;
-        while left > 0 {
+        while left > 0 && self.size() < most {
             let parts = 1u32 << halvings;
             if self.step(plane, time / f64::from(parts)).is_some() {
                 left -= 1;
@@ -124,7 +124,7 @@ impl Disturbance {
                 return false;
             }
         }
-        self.size().is_finite()
+        left == 0 && self.size() < most
     }
 
     /// A step of `h` s; none, and nothing has changed, if the disturbance grows within it.
@@ -190,8 +190,11 @@ impl Disturbance {
         Some(())
     }
 
-    /// Adds `part` of its rates to the spins of `state`, which is that of `plane` in space.
-    pub fn disturb(&self, plane: &Plane, part: f64, state: &mut State) {
+    /// Adds `part` of its rates to the spins of `state`, which is that of `plane` in space, or as much of them as changes no
+    /// spin by more than `most` rad/s.
+    pub fn disturb(&self, plane: &Plane, part: f64, most: f64, state: &mut State) {
+        let rates = || self.points.iter().chain([&self.tip]).map(|motion| motion.rate.yz().norm());
+        let part = part.min(most / rates().fold(0.0, f64::max));
         for (i, motion) in self.points.iter().chain([&self.tip]).enumerate() {
             let spin = plane.in_world([motion.rate.y * part, motion.rate.z * part]);
             let turned = state.remembering(i).rotation.tr_mul(&spin);

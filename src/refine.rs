@@ -120,6 +120,13 @@ impl Refiner {
         self.lately.clone_from(&other.lately);
     }
 
+    /// Where [`Self::copy_from`] keeps this one without allocating.
+    pub fn kept(&self) -> Self {
+        let mut kept = self.clone();
+        kept.lately.reserve(self.most_cells);
+        kept
+    }
+
     /// The coarsest mesh with all cells halved until there are `cells`: to start from, as many as any rule asks for. In the
     /// first instants of a release nothing is bent yet.
     pub fn start(&self, cells: usize) -> Mesh {

@@ -254,6 +254,13 @@ pub enum Error {
     },
     /// The equations of motion at the start are singular.
     NoStart(Diverged),
+    /// No equilibrium follows the last one: a rod that buckles or snaps is not at rest in between.
+    NoEquilibriumNearby {
+        /// Time since the start of the communication step, s.
+        time: f64,
+        /// How the way to the next one ended.
+        cause: Diverged,
+    },
     /// An internal step diverged however small it was made.
     Diverged {
         /// Time since the start of the communication step, s.
@@ -277,6 +284,11 @@ impl fmt::Display for Error {
                 "start_in_equilibrium: the static equilibrium is unstable (lowest squared frequency {omega_squared:.3e} 1/s2)"
             ),
             Self::NoStart(cause) => write!(f, "the equations of motion at the start have no solution ({cause})"),
+            Self::NoEquilibriumNearby { time, cause } => write!(
+                f,
+                "quasi_static: no static equilibrium follows the one at {time:.6} s after the communication point, as \
+                 when a rod buckles or snaps ({cause})"
+            ),
             Self::Diverged { time, step, cause } => {
                 write!(
                     f,
@@ -328,6 +340,7 @@ pub struct Unit {
     integrator: Integrator,
     /// Longest internal step, where the host gives it, s.
     step: Option<f64>,
+    quasi_static: bool,
     gravity: Vector3<f64>,
     path: Path,
     warned: bool,
@@ -438,7 +451,7 @@ impl Parameters {
             return Ok((uniform(likely.max(turn) as usize), None));
         }
         let coarsest = uniform((0.5 * likely).max(turn / COARSEST_TURN).ceil() as usize);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)) as usize);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
         Ok((refiner.start(likely as usize), Some(refiner)))
     }
@@ -500,6 +513,8 @@ const MAX_CELLS: i32 = 100_000;
 const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
 /// Cells at most, over those that are likely to be needed.
 const ROOM: f64 = 4.0;
+/// The same of a rod that is likely to need few: a base that turns winds it up, whatever its load.
+const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
@@ -581,6 +596,7 @@ impl Unit {
             integrator,
             step: (parameters.step > 0.0 || parameters.extensible)
                 .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
+            quasi_static: parameters.quasi_static,
             gravity: parameters.gravity,
             path,
             warned: false,
@@ -621,7 +637,10 @@ impl Unit {
             }
         };
         let done = self.integrator.advance(&drive, step_size);
-        done.map_err(|Failed { time, step, cause }| Error::Diverged { time, step, cause })?;
+        done.map_err(|Failed { time, step, cause }| match self.quasi_static {
+            true => Error::NoEquilibriumNearby { time, cause },
+            false => Error::Diverged { time, step, cause },
+        })?;
         let warning = self.disagreement(&segment, step_size);
         self.path = segment.into_path();
         self.read_out();

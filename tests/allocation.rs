@@ -135,6 +135,58 @@ fn a_communication_step_allocates_nothing() {
 }
 
 #[test]
+fn communication_steps_allocate_nothing_whatever_becomes_of_them() {
+    // a whip, on cells that change; pushed in its plane, out of it, and back once it is at rest; and no equilibrium
+    let whip = Parameters { tolerance: 1e-4, ..Parameters::default() };
+    let stiff = Parameters {
+        radius: 0.02,
+        youngs_modulus: 5e8,
+        shear_modulus: 2e8,
+        damping_bending: 0.1,
+        damping_twist: 0.1,
+        gravity: Vector3::zeros(),
+        ..Parameters::default()
+    };
+    let slow = Parameters { quasi_static: true, ..Parameters::default() };
+    let push = |direction: Vector3<f64>, size: f64| Inputs { tip_force: direction * size, ..Inputs::default() };
+    let (y, z) = (Vector3::y(), Vector3::z());
+    let drives: [(&str, Parameters, Vec<(Inputs, usize)>); 3] = [
+        ("whip", whip, vec![(push(z, 0.0), 40), (push(z, 1e150), 1), (push(y, 0.1), 20)]),
+        (
+            "stiff",
+            stiff,
+            vec![(push(y, 1.0), 5), (push(z, 1.0), 5), (push(z, 1e150), 1), (push(z, 0.0), 600), (push(y, 1.0), 5)],
+        ),
+        ("slow", slow, vec![(push(y, 0.1), 10), (push(z, 1e150), 1), (push(y, 0.1), 10)]),
+    ];
+    for (name, parameters, inputs) in drives {
+        let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+        let (mut cells, mut planes, mut refused) = (0, 0, 0);
+        let count = allocations(|| {
+            for (inputs, times) in &inputs {
+                for _ in 0..*times {
+                    let (before, was_planar) = (unit.outputs().cells, unit.outputs().solver.planar);
+                    refused += usize::from(unit.advance(inputs, 0.01).is_err());
+                    cells += usize::from(unit.outputs().cells != before);
+                    planes += usize::from(unit.outputs().solver.planar != was_planar);
+                }
+            }
+        });
+        assert_eq!(count, 0, "{name}");
+        assert!(refused == 1 && (cells > 0 || name != "whip"), "{name}: {refused} {cells}");
+        assert_eq!(
+            planes,
+            match name {
+                "whip" => 2,
+                "stiff" => 3,
+                _ => 0,
+            },
+            "{name}"
+        );
+    }
+}
+
+#[test]
 fn a_step_of_order_4_allocates_nothing() {
     let boundary =
         Boundary::hanging_from(Support::at_rest(Vector3::zeros(), Matrix3::identity()), Vector3::new(9.81, 0.0, 0.0));
