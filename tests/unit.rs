@@ -324,7 +324,8 @@ fn a_step_that_fails_is_not_seen_in_those_after_it() {
     let winding = |_: usize| Inputs { base_angular_velocity: Vec3::y() * 30.0, ..Inputs::default() };
     let weightless = Parameters { base_motion: 2, gravity: Vec3::zeros(), ..Parameters::default() };
     let slow = Parameters { quasi_static: true, ..Parameters::default() };
-    let drives: [(&str, Parameters, &dyn Fn(usize) -> Inputs); 5] = [
+    type Drive<'a> = (&'a str, Parameters, &'a dyn Fn(usize) -> Inputs);
+    let drives: [Drive; 5] = [
         ("in a plane", Parameters::default(), &shaken),
         ("in space", Parameters::default(), &pushed),
         ("released", Parameters { tolerance: 1e-4, ..Parameters::default() }, &still),
@@ -386,8 +387,8 @@ fn a_rod_moved_slowly_is_the_same_without_inertia_as_with_it() {
     };
     // drag lets the rope come to rest, and holds it back by a few 1e-4
     let rope = Parameters { damping_bending: 0.05, damping_twist: 0.05, damping_drag: 0.02, ..Parameters::default() };
-    let scenes: [(&str, Parameters, &dyn Fn(f64) -> Inputs, f64); 2] =
-        [("wire", wire, &swayed, 0.05), ("rope", rope, &loaded, 0.1)];
+    type Slow<'a> = (&'a str, Parameters, &'a dyn Fn(f64) -> Inputs, f64);
+    let scenes: [Slow; 2] = [("wire", wire, &swayed, 0.05), ("rope", rope, &loaded, 0.1)];
     for (name, parameters, inputs, h) in scenes {
         let full = Parameters { start_in_equilibrium: true, tolerance: 1e-4, ..parameters.clone() };
         let slow = Parameters { quasi_static: true, tolerance: 1e-3, ..parameters };
