@@ -13,7 +13,7 @@
 
 use crate::alpha::Scheme;
 use crate::boundary::{Boundary, Drive};
-use crate::energy::Energy;
+use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
 use crate::mesh::Mesh;
 use crate::plane::{Kept, Plane, Tip};
@@ -43,7 +43,7 @@ const CHANGE: (f64, f64) = (0.2, 4.0);
 /// space. A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
 const SPACE_SHARE: f64 = 0.5;
 /// The same in a plane.
-const PLANE_SHARE: f64 = 1.0;
+const PLANE_SHARE: f64 = 0.5;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
@@ -67,6 +67,9 @@ const ROUNDINGS: f64 = 1e-12;
 /// Energy that a step may gain, relative, over the error it may have: those that follow the motion gain up to 10
 /// times that, those that pass the end of a rotation vector 1000 times and more.
 const GAIN: f64 = 12.0;
+
+/// Part of a load or an acceleration by which it may differ and has not jumped: hosts round the time.
+const JUMP: f64 = 1e-9;
 
 /// How a rod is to be moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -434,7 +437,10 @@ impl Integrator {
                 *unwatched = (0.0, 0);
             }
         }
-        if self.in_plane && (entered || has_jumped(plane.drive(), &begin)) && plane.start(&begin).is_err() {
+        let Drive { boundary, rates } = plane.drive();
+        let jumped = has_jumped(boundary, &begin.boundary)
+            || differ(&rates.angular_acceleration, &begin.rates.angular_acceleration);
+        if self.in_plane && (entered || jumped) && plane.start(&begin).is_err() {
             if !entered {
                 write(plane, &mut self.stepper);
             }
@@ -466,7 +472,7 @@ impl Integrator {
                 self.in_plane = false;
                 return time;
             }
-            let begin = planar.plane.power();
+            let begin = if works { planar.plane.power() } else { Powers::default() };
             planar.plane.accept();
             self.effort.took(runge_kutta::ORDER, dt, error);
             self.effort.planar = true;
@@ -565,9 +571,7 @@ impl Integrator {
     /// A step of order 4 in space from `time` on, with the accelerations made consistent first where they are not.
     fn attempt(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64) -> Result<Attempt, Diverged> {
         let begin = drive(time).boundary;
-        let before = &self.stepper.state.boundary;
-        let jumped = (before.tip_force, before.tip_moment, before.gravity, before.base.acceleration)
-            != (begin.tip_force, begin.tip_moment, begin.gravity, begin.base.acceleration);
+        let jumped = has_jumped(&self.stepper.state.boundary, &begin);
         if jumped || self.stepper.state.dt > 0.0 {
             self.stepper.accelerate(&begin)?;
         }
@@ -721,12 +725,13 @@ fn write(plane: &mut Plane, stepper: &mut Stepper) {
 }
 
 /// Whether loads or accelerations of the base are not those that the rod's accelerations belong to.
-fn has_jumped(before: &Drive, now: &Drive) -> bool {
-    let acting = |drive: &Drive| {
-        let Boundary { base, tip_force, tip_moment, gravity, .. } = drive.boundary;
-        (tip_force, tip_moment, gravity, base.acceleration, drive.rates.angular_acceleration)
-    };
-    acting(before) != acting(now)
+fn has_jumped(before: &Boundary, now: &Boundary) -> bool {
+    let acting = |at: &Boundary| [at.tip_force, at.tip_moment, at.gravity, at.base.acceleration];
+    acting(before).iter().zip(&acting(now)).any(|(before, now)| differ(before, now))
+}
+
+fn differ(before: &Vec3, now: &Vec3) -> bool {
+    (now - before).norm() > JUMP * before.norm().max(now.norm())
 }
 
 /// Whether work is done on the ends.

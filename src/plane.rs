@@ -433,8 +433,9 @@ pub struct Plane {
     next_drive: Drive,
     fields: Vec<Field>,
     tip: Node,
-    /// The instant looked at.
+    /// The instant looked at, and what acts if that is the present.
     looked_at: Boundary,
+    seen: Option<Drive>,
     look_points: Vec<Points>,
 }
 
@@ -522,6 +523,7 @@ impl Plane {
             ends: Ends::default(),
             next_ends: Ends::default(),
             looked_at: drive.boundary,
+            seen: None,
             drive,
             next_drive: drive,
             fields: vec![Field::default(); count],
@@ -767,6 +769,7 @@ impl Plane {
         (self.ends, self.drive) = (self.ends_of(drive, &self.ends), *drive);
         self.before.copy_from_slice(&self.now);
         self.increments.fill(Points::default());
+        self.seen = None;
         self.look(1.0, drive);
     }
 
@@ -878,7 +881,7 @@ impl Plane {
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.before, &mut self.now);
         std::mem::swap(&mut self.now, &mut self.next);
-        (self.ends, self.drive) = (self.next_ends, self.next_drive);
+        (self.ends, self.drive, self.seen) = (self.next_ends, self.next_drive, None);
     }
 
     fn rates_of(&self, now: &Drive, drive: &impl Fn(f64) -> Drive, h: f64) -> EndRates {
@@ -1178,7 +1181,12 @@ impl Plane {
     /// out refers to the instant last looked at. A fraction within the step holds to the order of the estimate, and
     /// until the next attempt.
     pub fn look(&mut self, fraction: f64, drive: &Drive) {
-        if fraction == 1.0 {
+        let present = (fraction == 1.0).then_some(*drive);
+        if present.is_some() && present == self.seen {
+            return;
+        }
+        self.seen = present;
+        if present.is_some() {
             self.look_points.copy_from_slice(&self.now);
         } else {
             let count = self.cells.len();

@@ -150,7 +150,8 @@ fn communication_steps_allocate_nothing_whatever_becomes_of_them() {
     let slow = Parameters { quasi_static: true, ..Parameters::default() };
     let push = |direction: Vector3<f64>, size: f64| Inputs { tip_force: direction * size, ..Inputs::default() };
     let (y, z) = (Vector3::y(), Vector3::z());
-    let drives: [(&str, Parameters, Vec<(Inputs, usize)>); 3] = [
+    type Pushes = Vec<(Inputs, usize)>;
+    let drives: [(&str, Parameters, Pushes); 3] = [
         ("whip", whip, vec![(push(z, 0.0), 40), (push(z, 1e150), 1), (push(y, 0.1), 20)]),
         (
             "stiff",

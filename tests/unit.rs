@@ -266,3 +266,180 @@ fn long_rods_go_through_a_second() {
         assert!((outputs.tip_position - at(1.0).base_position).norm() <= parameters.length);
     }
 }
+
+/// What tells two units apart: all that they hand out, to the bit.
+fn bits(unit: &Unit) -> String {
+    format!("{:?}", unit.outputs())
+}
+
+#[test]
+fn a_base_that_turns_winds_the_rod_up_and_does_not_lose_it() {
+    // without weight the rod coils up; 100 rad/s turn a half of the cells that it starts on past a full turn in 0.3 s
+    let parameters = Parameters { base_motion: 2, gravity: Vec3::zeros(), ..Parameters::default() };
+    for planar in [true, false] {
+        for omega in [3.0, 30.0, 100.0] {
+            for tolerance in [1e-2, 1e-3] {
+                let parameters = Parameters { planar, tolerance, ..parameters.clone() };
+                let turning = Inputs { base_angular_velocity: Vec3::y() * omega, ..Inputs::default() };
+                let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+                for i in 0..100 {
+                    let done = unit.advance(&turning, 0.01);
+                    done.unwrap_or_else(|error| panic!("{omega} rad/s, {tolerance:e}, step {i}: {error}"));
+                    assert!(unit.outputs().tip_position.norm() <= parameters.length);
+                }
+                let Outputs { cells, solver, .. } = unit.outputs();
+                assert!(*cells <= 64 && solver.steps < 5000, "{omega} rad/s: {cells} cells, {} steps", solver.steps);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rod_that_is_overdamped_buckles_out_of_its_plane_slowly() {
+    // without its damping the disturbance grows by 60 powers of ten from one look at it to the next
+    let parameters = Parameters {
+        radius: 1e-3,
+        youngs_modulus: 1e9,
+        shear_modulus: 1e9 / 3.0,
+        damping_bending: 10.0,
+        damping_twist: 10.0,
+        damping_drag: 100.0,
+        start_in_equilibrium: true,
+        tolerance: 1e-5,
+        ..Parameters::default()
+    };
+    let pulled = Inputs { tip_force: Vec3::x() * (10.0 * mass(&parameters) * 9.81), ..Inputs::default() };
+    let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+    for i in 0..40 {
+        unit.advance(&pulled, 0.01).unwrap_or_else(|error| panic!("step {i}: {error}"));
+    }
+    assert!(unit.outputs().tip_position.y.abs() < 1e-6, "{}", unit.outputs().tip_position);
+}
+
+#[test]
+fn a_step_that_fails_is_not_seen_in_those_after_it() {
+    let shaken = |i: usize| Inputs { base_velocity: Vec3::x() * (0.3 * (0.3 * i as f64).sin()), ..Inputs::default() };
+    let pushed = |i: usize| Inputs { tip_force: Vec3::y() * (0.02 * (0.2 * i as f64).sin()), ..Inputs::default() };
+    let still = |_: usize| Inputs::default();
+    let winding = |_: usize| Inputs { base_angular_velocity: Vec3::y() * 30.0, ..Inputs::default() };
+    let weightless = Parameters { base_motion: 2, gravity: Vec3::zeros(), ..Parameters::default() };
+    let slow = Parameters { quasi_static: true, ..Parameters::default() };
+    type Drive<'a> = (&'a str, Parameters, &'a dyn Fn(usize) -> Inputs);
+    let drives: [Drive; 5] = [
+        ("in a plane", Parameters::default(), &shaken),
+        ("in space", Parameters::default(), &pushed),
+        ("released", Parameters { tolerance: 1e-4, ..Parameters::default() }, &still),
+        ("wound up", weightless, &winding),
+        ("slow", slow, &pushed),
+    ];
+    let violent = [1e150, 1e3].map(|size| Inputs { tip_force: Vec3::z() * size, ..Inputs::default() });
+    let spun =
+        [1e4, 1e9].map(|size| Inputs { base_angular_velocity: Vec3::new(1.0, 2.0, 3.0) * size, ..Inputs::default() });
+    for (name, parameters, inputs) in drives {
+        let mut failed = 0;
+        let mut unit = Unit::new(&parameters, &inputs(0), None).unwrap();
+        for i in 0..50 {
+            if i % 20 == 5 {
+                for violent in violent.iter().chain(&spun) {
+                    let mut repeated = unit.clone();
+                    if repeated.advance(violent, 0.05).is_ok() {
+                        continue;
+                    }
+                    failed += 1;
+                    assert_eq!(bits(&repeated), bits(&unit), "{name}, step {i}");
+                    let mut other = unit.clone();
+                    for j in i..i + 50 {
+                        other.advance(&inputs(j), 0.01).unwrap();
+                        repeated.advance(&inputs(j), 0.01).unwrap();
+                        assert_eq!(bits(&repeated), bits(&other), "{name}, step {i} and {j}");
+                    }
+                }
+            }
+            unit.advance(&inputs(i), 0.01).unwrap();
+        }
+        assert!(failed >= 3, "{name}: {failed}");
+    }
+}
+
+#[test]
+fn a_rod_moved_slowly_is_the_same_without_inertia_as_with_it() {
+    let wire = Parameters {
+        radius: 1e-3,
+        youngs_modulus: 2e11,
+        shear_modulus: 2e11 / 2.6,
+        density: 7850.0,
+        ..Parameters::default()
+    };
+    let swayed = |t: f64| {
+        let (sin, cos) = (TAU * 0.05 * t).sin_cos();
+        let (angle, rate) = (0.25 * (1.0 - cos), 0.25 * TAU * 0.05 * sin);
+        let half = 0.25 * TAU + angle;
+        Inputs {
+            base_orientation: Vector4::new((0.5 * half).cos(), 0.0, (0.5 * half).sin(), 0.0),
+            base_angular_velocity: Vec3::y() * rate,
+            ..Inputs::default()
+        }
+    };
+    let weight = mass(&Parameters::default()) * 9.81;
+    let loaded = |t: f64| {
+        let part = 0.5 * (1.0 - (0.008 * TAU * t).cos());
+        Inputs { tip_force: Vec3::new(0.5, 0.2, 0.0) * (weight * part), ..Inputs::default() }
+    };
+    // drag lets the rope come to rest, and holds it back by a few 1e-4
+    let rope = Parameters { damping_bending: 0.05, damping_twist: 0.05, damping_drag: 0.02, ..Parameters::default() };
+    type Slow<'a> = (&'a str, Parameters, &'a dyn Fn(f64) -> Inputs, f64);
+    let scenes: [Slow; 2] = [("wire", wire, &swayed, 0.05), ("rope", rope, &loaded, 0.1)];
+    for (name, parameters, inputs, h) in scenes {
+        let full = Parameters { start_in_equilibrium: true, tolerance: 1e-4, ..parameters.clone() };
+        let slow = Parameters { quasi_static: true, tolerance: 1e-3, ..parameters };
+        let [mut full, mut slow] = [full, slow].map(|p| Unit::new(&p, &inputs(0.0), None).unwrap());
+        let start = slow.outputs().energy;
+        let (mut work, mut missed) = (0.0f64, 0.0f64);
+        for i in 0..250 {
+            for unit in [&mut full, &mut slow] {
+                unit.advance(&inputs(f64::from(i) * h), h).unwrap();
+            }
+            let (full, slow) = (full.outputs(), slow.outputs());
+            work = work.max(slow.energy.work_base.abs() + slow.energy.work_tip.abs());
+            let away = (full.tip_position - slow.tip_position).norm();
+            let force = (full.base_reaction_force - slow.base_reaction_force).norm() / full.base_reaction_force.norm();
+            let speed = (full.tip_velocity - slow.tip_velocity).norm();
+            let balance = slow.energy.residual(&start).abs();
+            assert!(away < 1e-3 && force < 5e-3, "{name}, step {i}: tip {away:e}, force {force:e}");
+            assert!(speed < 5e-3, "{name}, step {i}: {speed:e}");
+            missed = missed.max(balance);
+            assert_eq!(slow.energy.dissipated, 0.0);
+        }
+        // the work of the mean load, and the kinetic energy, which no force has made
+        assert!(missed < 2e-3 * work, "{name}: {missed:e} of {work:e}");
+    }
+}
+
+#[test]
+fn a_rod_moved_slowly_through_a_limit_point_is_refused_and_goes_back() {
+    // a cord that leans over its base falls to the other side once that has turned far enough
+    let parameters = Parameters { quasi_static: true, base_motion: 2, ..Parameters::default() };
+    let turning = |omega: f64| Inputs { base_angular_velocity: Vec3::y() * omega, ..Inputs::default() };
+    let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+    let mut turned = 0;
+    let error = loop {
+        assert!(turned < 200, "it never snaps");
+        match unit.advance(&turning(-0.5), 0.1) {
+            Ok(_) => turned += 1,
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(error, Error::NoEquilibriumNearby { .. }), "{error}");
+    assert!(error.to_string().contains("quasi_static"), "{error}");
+    // back, as one that was never refused
+    let mut other = Unit::new(&parameters, &Inputs::default(), None).unwrap();
+    for _ in 0..turned {
+        other.advance(&turning(-0.5), 0.1).unwrap();
+    }
+    for _ in 0..turned {
+        assert_eq!(bits(&unit), bits(&other));
+        for unit in [&mut unit, &mut other] {
+            unit.advance(&turning(0.5), 0.1).unwrap();
+        }
+    }
+}

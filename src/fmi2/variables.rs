@@ -287,7 +287,7 @@ pub static ROWS: &[Row] = &[
     scalar("planar", "", BooleanParameter(|p| &mut p.planar),
         "Whether the rod may be computed in a plane as long as it lies and moves in one, and all that acts on it leaves it there"),
     scalar("quasi_static", "", BooleanParameter(|p| &mut p.quasi_static),
-        "Whether the rod goes from one static equilibrium to the next, without inertia and damping"),
+        "Whether the rod goes from one static equilibrium to the next, without inertia and damping; it starts from one, and loads go steadily from their last values to the new ones in every communication step"),
 
     array("base.position", "m", XYZ, Input(|i, k| &mut i.base_position[k]),
         "Position of the base point, world frame"),

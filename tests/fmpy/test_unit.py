@@ -79,7 +79,9 @@ def test_simulate_without_options_runs_the_default_experiment(tmp_path):
     with open(tmp_path / "out.csv") as file:
         rows = list(csv.DictReader(file))
     assert np.allclose([float(row["time"]) for row in rows], STEP * np.arange(STEPS + 1), rtol=0, atol=1e-9)
-    assert all(math.isfinite(float(value)) for row in rows for value in row.values())
+    # fmpy writes Booleans in words
+    numbers = [value for row in rows for value in row.values() if value not in ("False", "True")]
+    assert all(math.isfinite(float(value)) for value in numbers)
 
 
 def table(path):
