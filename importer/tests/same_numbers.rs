@@ -50,8 +50,9 @@ fn the_default_rod_moves_as_in_the_library() {
     let inputs = Columns::new(&driven, |name| reference(name, "Input", "Real"));
     let outputs = Columns::new(&header, |name| reference(name, "Output", "Real"));
     let counts = Columns::new(&header, |name| reference(name, "Output", "Integer"));
+    let flags = Columns::new(&header, |name| reference(name, "Output", "Boolean"));
     assert_eq!(1 + inputs.0.len(), driven.len());
-    assert_eq!(1 + outputs.0.len() + counts.0.len(), header.len());
+    assert_eq!(1 + outputs.0.len() + counts.0.len() + flags.0.len(), header.len());
     assert_eq!((drive.len(), expected.len()), (201, 201));
 
     let mut instance = import.instantiate_cs("rod", false, true).unwrap();
@@ -63,11 +64,15 @@ fn the_default_rod_moves_as_in_the_library() {
         let time = drive[k][0];
         assert_eq!(row[0], time);
         let (mut reals, mut integers) = (vec![0.0; outputs.0.len()], vec![0; counts.0.len()]);
+        let mut booleans = vec![0; flags.0.len()];
         instance.get_real(&outputs.0, &mut reals).unwrap();
         instance.get_integer(&counts.0, &mut integers).unwrap();
+        instance.get_boolean(&flags.0, &mut booleans).unwrap();
         let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<u64>>();
         assert_eq!(bits(&reals), bits(&outputs.of(row)), "at {time} s");
-        assert_eq!(integers.iter().copied().map(f64::from).collect::<Vec<f64>>(), counts.of(row), "at {time} s");
+        let numbers = |values: &[i32]| values.iter().copied().map(f64::from).collect::<Vec<f64>>();
+        assert_eq!(numbers(&integers), counts.of(row), "at {time} s");
+        assert_eq!(numbers(&booleans), flags.of(row), "at {time} s");
         if let Some(next) = drive.get(k + 1) {
             instance.set_real(&inputs.0, &inputs.of(&drive[k])).unwrap();
             instance.do_step(time, next[0] - time, true).unwrap();
