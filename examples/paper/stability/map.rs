@@ -8,7 +8,7 @@ use plotters::style::text_anchor::HPos;
 use std::error::Error;
 
 /// On the page: a square of the map, its panels and what stands left of them.
-const SQUARE: (f64, f64) = (13.0, 7.0);
+const SQUARE: (f64, f64) = (13.0, 6.0);
 const PANEL: (f64, f64) = (SQUARE.0 * TIME_STEPS.len() as f64, SQUARE.1 * (MATERIALS.len() * CELLS.len()) as f64);
 const GAP: (f64, f64) = (14.0, 12.0);
 const LEFT: f64 = 190.0;

@@ -88,7 +88,7 @@ impl Method {
             Self::PoseByRotations => "pose, a from rotations",
             Self::PoseByPositions => "pose, a from positions",
             Self::Pose => "pose, the unit's way",
-            Self::Unit => "the unit by itself, tolerance 1e-2 to 1e-5",
+            Self::Unit => "the unit by itself, to 1e-2 … 1e-5",
             Self::Shooting => "shooting, of rate, mended",
             Self::Explicit => "explicit, with springs",
         }

@@ -399,7 +399,7 @@ pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
         text(page, "What the unit makes of a tolerance", (24.0, 22.0), 19.0, INK, HPos::Left)?;
         let panels = [
             ("error of the tip over the tolerance", error, (-4, 1), 3.0),
-            ("CPU time over that of the cheapest cells and steps which meet it", cost, (-2, 1), 2.0),
+            ("CPU time over that of the cheapest cells and steps which meet it", cost, (-1, 2), 2.0),
         ];
         for (number, (title, value, range, bound)) in panels.into_iter().enumerate() {
             let axes = Axes { time: (-6, -2), error: range };
