@@ -23,9 +23,9 @@ fn the_tip_is_within_three_times_the_tolerance() {
     for scene in Scene::ALL {
         let (tips, uncertainty) = reference(scene);
         let length = scene.parameters().length;
-        // finer ones take as long as all of these
-        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5] {
-            assert!(tolerance >= 3.0 * uncertainty);
+        // as far as the reference can tell
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6].into_iter().filter(|tolerance| *tolerance >= 3.0 * uncertainty)
+        {
             let mut rod = scene.parameters().start(&scene.boundary(0.0), tolerance).unwrap();
             let interval = scene.duration() / (tips.len() - 1) as f64;
             let mut sum = 0.0;
