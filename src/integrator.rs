@@ -64,8 +64,8 @@ const FADED: f64 = 0.01;
 /// The size that the disturbance had at first, rad; about the roundings of a rod in space.
 const ROUNDINGS: f64 = 1e-12;
 
-/// Energy that a step may gain, relative, over the error it may have: those that follow the motion gain up to 10
-/// times that, those that pass the end of a rotation vector 1000 times and more.
+/// Energy that a step in space may gain, relative, over the error it may have: those that follow the motion gain up to 4
+/// times that, those that pass the end of a rotation vector 400 times and more.
 const GAIN: f64 = 12.0;
 
 /// Part of a load or an acceleration by which it may differ and has not jumped: hosts round the time.
@@ -303,6 +303,7 @@ impl Integrator {
                 time,
             }
         });
+        let pace = pace(SPACE_SHARE, SHORTEST_STEP);
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
         let effort = Effort::default();
         let length = stepper.mesh.length();
@@ -313,14 +314,17 @@ impl Integrator {
             way,
             scheme,
             step,
-            before: Before { in_plane: false, pace: pace(SPACE_SHARE, SHORTEST_STEP), energy, effort },
-            pace: pace(SPACE_SHARE, SHORTEST_STEP),
+            before: Before { in_plane: false, pace, energy, effort },
+            pace,
             large: weight * length + stepper.rod.stiffness.max() / length,
             energy,
             effort,
             state_before,
             mesh_before,
-            refiners: refiner.map(|refiner| (refiner.kept(), refiner)).map(|(kept, refiner)| (refiner, kept)),
+            refiners: refiner.map(|refiner| {
+                let kept = refiner.kept();
+                (refiner, kept)
+            }),
             stepper,
         })
     }
@@ -345,16 +349,12 @@ impl Integrator {
     fn keep(&mut self) {
         let Self { in_plane, pace, energy, effort, .. } = *self;
         self.before = Before { in_plane, pace, energy, effort };
-        if let Some(planar) = &mut self.planar {
-            planar.before.0 = planar.pace;
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
+            (before.0, before.2) = (*pace, *unwatched);
+            before.1.copy_from(disturbance);
         }
         match &mut self.planar {
-            Some(planar) if in_plane => {
-                planar.plane.keep(&mut planar.kept);
-                let (_, disturbance, unwatched) = &mut planar.before;
-                *unwatched = planar.unwatched;
-                disturbance.copy_from(&planar.disturbance);
-            }
+            Some(planar) if in_plane => planar.plane.keep(&mut planar.kept),
             _ => {
                 self.mesh_before.cells.clone_from(&self.stepper.mesh.cells);
                 self.state_before.copy_from(&self.stepper.state);
@@ -369,16 +369,12 @@ impl Integrator {
         let Before { in_plane, pace, energy, effort } = self.before;
         (self.in_plane, self.pace, self.energy, self.effort) = (in_plane, pace, energy, effort);
         // a plane that the interval has entered keeps nothing of it
-        if let Some(planar) = &mut self.planar {
-            planar.pace = planar.before.0;
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
+            (*pace, *unwatched) = (before.0, before.2);
+            disturbance.copy_from(&before.1);
         }
         match &mut self.planar {
-            Some(planar) if in_plane => {
-                planar.plane.restore(&planar.kept);
-                let (_, disturbance, unwatched) = &planar.before;
-                planar.unwatched = *unwatched;
-                planar.disturbance.copy_from(disturbance);
-            }
+            Some(planar) if in_plane => planar.plane.restore(&planar.kept),
             _ => self.stepper.resume(&self.mesh_before, &self.state_before),
         }
         if let Some((now, before)) = &mut self.refiners {
@@ -470,7 +466,7 @@ impl Integrator {
                 }
                 write(&mut planar.plane, &mut self.stepper);
                 self.in_plane = false;
-                return time;
+                break;
             }
             let begin = if works { planar.plane.power() } else { Powers::default() };
             planar.plane.accept();

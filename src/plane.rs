@@ -723,12 +723,6 @@ impl Plane {
             && normal.iter().all(|(vector, size)| is_parallel(vector, b, *size))
     }
 
-    /// θ, ω and β of the Gauss points (rad and s), cell by cell and one of the three after the other.
-    pub fn state(&self) -> impl Iterator<Item = f64> + '_ {
-        let stages = self.mesh.rule.stages;
-        self.now.iter().flat_map(move |points| points.iter().flat_map(move |lane| &lane[..stages])).copied()
-    }
-
     #[inline]
     fn ends_of(&self, drive: &Drive, old: &Ends) -> Ends {
         let Boundary { base, tip_force, tip_moment, gravity, .. } = &drive.boundary;

@@ -207,15 +207,20 @@ fn a_step_of_order_4_allocates_nothing() {
     assert_eq!(count, 0);
 }
 
-#[test]
-fn a_plane_rod_allocates_nothing_once_built() {
+/// A rod with a body at its tip and what acts on it, in a plane.
+fn loaded() -> (Rod, Drive) {
     let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
     let boundary = Boundary {
         tip_force: Vector3::new(0.1, 0.0, 0.0),
         ..Boundary::hanging_from(base, Vector3::new(9.81, 0.0, 0.0))
     };
-    let drive = Drive { boundary, rates: Rates::default() };
     let rod = Rod { tip_mass: 0.01, tip_inertia: 1e-6, ..Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0) };
+    (rod, Drive { boundary, rates: Rates::default() })
+}
+
+#[test]
+fn a_plane_rod_allocates_nothing_once_built() {
+    let (rod, drive) = loaded();
     for method in [&RODAS4, &RODAS5P] {
         for stages in 1..=4 {
             let mesh = Mesh::uniform(1.0, 3, stages, Vector3::zeros());
@@ -235,18 +240,13 @@ fn a_plane_rod_allocates_nothing_once_built() {
 
 #[test]
 fn a_change_of_cells_allocates_nothing() {
-    let base = Support::at_rest(Vector3::zeros(), Matrix3::identity());
-    let boundary = Boundary {
-        tip_force: Vector3::new(0.1, 0.0, 0.0),
-        ..Boundary::hanging_from(base, Vector3::new(9.81, 0.0, 0.0))
-    };
-    let drive = Drive { boundary, rates: Rates::default() };
-    let rod = Rod { tip_mass: 0.01, tip_inertia: 1e-6, ..Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0) };
+    let (rod, drive) = loaded();
+    let boundary = drive.boundary;
     for stages in 1..=4 {
         let mesh = Mesh::uniform(1.0, 3, stages, Vector3::zeros());
         // halves all there is, and joins what there is
         let mut refiners = [0.0, f64::INFINITY].map(|tolerance| Refiner::new(&mesh, tolerance, 12));
-        let mut stepper = Stepper::new(mesh.clone(), rod.clone(), State::at_rest_shape(&mesh, &base));
+        let mut stepper = Stepper::new(mesh.clone(), rod.clone(), State::at_rest_shape(&mesh, &boundary.base));
         let backup = stepper.state.clone();
         stepper.reserve(12);
         let mut plane = Plane::of(&mesh, &rod, &drive, &RODAS4).expect("a plane rod");

@@ -79,18 +79,8 @@ fn released_rods_survive_every_step_size_at_spectral_radius_zero() {
 fn the_unit_carries_other_radii_through() {
     for spectral_radius in [0.3, 0.5, 0.8, 1.0] {
         for step in STEPS {
-            let parameters = Parameters {
-                length: 0.25,
-                radius: (1.5e-9 / PI).sqrt(),
-                density: 1320.0,
-                youngs_modulus: 3.89e9,
-                shear_modulus: 0.89e9,
-                damping_bending: 0.0,
-                damping_twist: 0.0,
-                spectral_radius,
-                step,
-                ..Parameters::default()
-            };
+            let [(_, hair), ..] = materials();
+            let parameters = Parameters { spectral_radius, step, ..hair };
             let mut unit = Unit::new(&parameters, &Inputs::default(), None).unwrap();
             for i in 0..200 {
                 let result = unit.advance(&Inputs::default(), step);
