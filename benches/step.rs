@@ -30,6 +30,7 @@ use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::{Row, State, Time, assemble};
 use cosserat_rod::rod::Rod;
 use cosserat_rod::rosenbrock::RODAS4;
+use cosserat_rod::runge_kutta::ESDIRK4;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::sweep::{Sweep, System};
@@ -223,7 +224,7 @@ impl Whole {
     fn step(&mut self) -> usize {
         match self {
             Self::Space(stepper, boundary) => {
-                let attempt = stepper.attempt(&|_| *boundary, WHOLE_STEP, 1e-4).expect("a step");
+                let attempt = stepper.attempt(&ESDIRK4, &|_| *boundary, WHOLE_STEP, 1e-4).expect("a step");
                 stepper.accept();
                 attempt.iterations
             }

@@ -19,8 +19,8 @@ use crate::mesh::Mesh;
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
 use crate::refine::Refiner;
-use crate::rosenbrock::RODAS4;
-use crate::runge_kutta;
+use crate::rosenbrock::{RODAS4, RODAS5P};
+use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
 use crate::stepper::{Attempt, Diverged, Stepper};
 use nalgebra::{Matrix3, Vector3};
 
@@ -39,11 +39,17 @@ const SAFETY: f64 = 0.9;
 /// Bounds of the change from one step to the next.
 const CHANGE: (f64, f64) = (0.2, 4.0);
 
-/// Estimated error of the steps in the time that gravity or stiffness take to move the whole rod, over the tolerance; in
-/// space. A rope, a wire and a tip pulse, of two to six such times, were off by one to three times their steps' estimates.
-const SPACE_SHARE: f64 = 0.5;
+/// Estimated error that a step in space may have, over the tolerance.
+const SPACE_SHARE: f64 = 0.015;
 /// The same in a plane.
-const PLANE_SHARE: f64 = 0.5;
+const PLANE_SHARE: f64 = 0.02;
+/// Estimated error of steps in the time that gravity or stiffness take to move the whole rod, over the tolerance: of those
+/// of order 2, and what energy may grow by is measured by it too.
+const SHARE_IN_TIME: f64 = 0.5;
+/// Tolerance below which steps in a plane are of order 5.
+const FINE: f64 = 5e-5;
+/// How much longer steps of order 2 may be with every interval that one of order 4 has passed.
+const HOPE: f64 = 1.05;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
@@ -64,9 +70,16 @@ const FADED: f64 = 0.01;
 /// The size that the disturbance had at first, rad; about the roundings of a rod in space.
 const ROUNDINGS: f64 = 1e-12;
 
-/// Energy that a step in space may gain, relative, over the error it may have: those that follow the motion gain up to 4
+/// Energy that a step may gain, relative, over the error that goes with its time: those in space that follow the motion gain up to 4
 /// times that, those that pass the end of a rotation vector 400 times and more.
 const GAIN: f64 = 12.0;
+
+/// Kinetic energy up to which a rod rests, over that of motions as large as the rod with an amplitude of the tolerance.
+const AT_REST: f64 = 1e-6;
+
+/// Part of the time in which gravity or stiffness move the whole rod that a step in a plane may gain as much energy as, however
+/// short it is: in a whip errors of a step are a part of its square, and shorter ones never good enough.
+const SUDDEN: f64 = 0.002;
 
 /// Part of a load or an acceleration by which it may differ and has not jumped: hosts round the time.
 const JUMP: f64 = 1e-9;
@@ -139,11 +152,13 @@ pub struct Ends {
     pub moment: Vec3,
 }
 
-/// How long the steps of a model may be.
+/// How long the steps of a method may be.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
-    /// Error they may have in a second, over the length.
+    /// Error that one may have, over the length.
     allowed: f64,
+    /// Order of the method, and power of the step that the part of what is allowed goes with.
+    order: i32,
     /// The next one, if its error allows, s.
     next: f64,
     /// The shortest, s: what is faster than that is damped, not followed.
@@ -159,20 +174,18 @@ impl Pace {
 
     /// Whether a step of `dt` s with the estimated error `error` is good enough; and sets the next one.
     fn allows(&mut self, dt: f64, error: f64) -> bool {
-        let part = error / (self.allowed * dt);
-        self.next = dt * stretch(part);
+        let part = error / self.allowed;
+        self.next = dt * stretch(part, self.order);
         part <= 1.0
     }
 }
 
-/// How much longer the next step may be than one with the error `part`, as a part of what is allowed; steps are allowed
-/// errors in proportion to their length.
-fn stretch(part: f64) -> f64 {
+/// How much longer the next step may be than one with the error `part`, as a part of what is allowed.
+fn stretch(part: f64, order: i32) -> f64 {
     if !part.is_finite() {
         return LOST;
     }
-    // the estimate goes with h⁴, what is allowed with h
-    (SAFETY * part.max(1e-12).powf(-1.0 / 3.0)).clamp(CHANGE.0, CHANGE.1)
+    (SAFETY * part.max(1e-12).powf(-1.0 / f64::from(order))).clamp(CHANGE.0, CHANGE.1)
 }
 
 /// How a step without an estimate of its error is taken.
@@ -184,6 +197,15 @@ enum Kind {
     Damped,
     /// To the equilibrium at its end.
     Resting,
+}
+
+/// What became of a step in space.
+enum Outcome {
+    Taken,
+    /// A shorter one may do.
+    TooLong,
+    /// Its cells were not as fine as they ought to be; whether they are now.
+    TooCoarse(bool),
 }
 
 /// A rod that may be in a plane.
@@ -225,6 +247,7 @@ impl Planar {
 struct Before {
     in_plane: bool,
     pace: Pace,
+    simple: Pace,
     energy: Energy,
     effort: Effort,
 }
@@ -242,8 +265,14 @@ pub struct Integrator {
     step: f64,
     /// Of the steps in space whose error chooses their length.
     pace: Pace,
+    /// Of steps of order 2, which serve where one reaches the end of the interval.
+    simple: Pace,
     /// What gravity and bending can give the rod, J.
     large: f64,
+    /// Kinetic energy up to which it rests, J: cells that are joined then bring nothing but waves.
+    rest: f64,
+    /// Error in a second that goes with the tolerance, over the length.
+    drift: f64,
     energy: Energy,
     effort: Effort,
     before: Before,
@@ -275,8 +304,9 @@ impl Integrator {
             Way::Accurate { tolerance, time, planar } => (tolerance, time, planar),
             Way::Equal | Way::Static => (0.0, 0.0, false),
         };
-        let pace = |share: f64, shortest: f64| Pace {
-            allowed: share * tolerance / time,
+        let pace = |order: i32, share: f64, shortest: f64| Pace {
+            allowed: share * tolerance,
+            order,
             next: time * FIRST_STEP,
             shortest: shortest * step,
         };
@@ -289,10 +319,11 @@ impl Integrator {
         mesh_before.cells.reserve(most - cells.len());
         stepper.reserve(most);
         let planar = planar.then(|| {
-            let mut plane = Plane::new(&stepper.mesh, &stepper.rod, &RODAS4);
+            let method = if tolerance < FINE { &RODAS5P } else { &RODAS4 };
+            let mut plane = Plane::new(&stepper.mesh, &stepper.rod, method);
             plane.reserve(most);
             let room = || Disturbance::new(most * stages);
-            let (pace, unwatched) = (pace(PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
+            let (pace, unwatched) = (pace(method.order as i32, PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
             Planar {
                 kept: plane.kept(),
                 before: (pace, room(), unwatched),
@@ -303,20 +334,25 @@ impl Integrator {
                 time,
             }
         });
-        let pace = pace(SPACE_SHARE, SHORTEST_STEP);
+        let simple = pace(TR_BDF2.order, SPACE_SHARE, SHORTEST_STEP);
+        let pace = pace(ESDIRK4.order, SPACE_SHARE, SHORTEST_STEP);
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
         let effort = Effort::default();
         let length = stepper.mesh.length();
         let weight = stepper.rod.mass_per_length * length * boundary.gravity.norm();
+        let large = weight * length + stepper.rod.stiffness.max() / length;
         Ok(Self {
             in_plane: false,
             planar,
             way,
             scheme,
             step,
-            before: Before { in_plane: false, pace, energy, effort },
+            before: Before { in_plane: false, pace, simple, energy, effort },
             pace,
-            large: weight * length + stepper.rod.stiffness.max() / length,
+            simple,
+            large,
+            rest: AT_REST * tolerance * tolerance * large,
+            drift: SHARE_IN_TIME * tolerance / time,
             energy,
             effort,
             state_before,
@@ -347,8 +383,8 @@ impl Integrator {
     }
 
     fn keep(&mut self) {
-        let Self { in_plane, pace, energy, effort, .. } = *self;
-        self.before = Before { in_plane, pace, energy, effort };
+        let Self { in_plane, pace, simple, energy, effort, .. } = *self;
+        self.before = Before { in_plane, pace, simple, energy, effort };
         if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
             (before.0, before.2) = (*pace, *unwatched);
             before.1.copy_from(disturbance);
@@ -366,8 +402,9 @@ impl Integrator {
     }
 
     fn restore(&mut self) {
-        let Before { in_plane, pace, energy, effort } = self.before;
-        (self.in_plane, self.pace, self.energy, self.effort) = (in_plane, pace, energy, effort);
+        let Before { in_plane, pace, simple, energy, effort } = self.before;
+        (self.in_plane, self.pace, self.simple) = (in_plane, pace, simple);
+        (self.energy, self.effort) = (energy, effort);
         // a plane that the interval has entered keeps nothing of it
         if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
             (*pace, *unwatched) = (before.0, before.2);
@@ -450,17 +487,54 @@ impl Integrator {
         let Some(planar) = &mut self.planar else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
-        if works {
+        if !planar.plane.is_seen() {
             planar.plane.look(1.0, &begin);
         }
+        // what pulls the rod may be other than before
+        self.energy = self.energy.now(&planar.plane.energy());
         let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
-        let mut time = 0.0;
+        let (mut time, mut refuses) = (0.0, true);
         while time < duration {
             let (dt, last) = Pace { shortest, ..planar.pace }.step(duration - time);
             let at = |since: f64| drive(time + since);
             let error = planar.plane.attempt(&at, dt).map_or(f64::NAN, |estimate| estimate.position);
-            if !planar.pace.allows(dt, error) {
-                self.effort.retries = self.effort.retries.saturating_add(1);
+            let mut fits = planar.pace.allows(dt, error);
+            if fits {
+                let begin = if works { planar.plane.power() } else { Powers::default() };
+                planar.plane.accept();
+                let mut work = Powers::default();
+                if works {
+                    planar.plane.look(0.5, &at(0.5 * dt));
+                    let middle = planar.plane.power();
+                    planar.plane.look(1.0, &at(dt));
+                    // Simpson's rule
+                    work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(planar.plane.power(), dt / 6.0);
+                } else {
+                    planar.plane.look(1.0, &at(dt));
+                }
+                let energy = self.energy.worked(&work).now(&planar.plane.energy());
+                if gain(&self.energy, &energy, &work, self.large) > GAIN * self.drift * dt.max(SUDDEN * planar.time) {
+                    planar.plane.take_back();
+                    planar.plane.look(1.0, &at(0.0));
+                    planar.pace.next = dt * LOST;
+                    fits = false;
+                } else if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
+                    let refused = refiner.refuse_plane(&mut planar.plane, &at(0.0));
+                    if refused != Ok(false) {
+                        // cells that cannot be started stay as they were
+                        refuses = refused.is_ok();
+                        planar.disturbance.go_on(&planar.plane);
+                        self.energy = self.energy.now(&planar.plane.energy());
+                        self.effort.retried();
+                        continue;
+                    }
+                }
+                if fits {
+                    self.energy = energy;
+                }
+            }
+            if !fits {
+                self.effort.retried();
                 if dt > shortest {
                     continue;
                 }
@@ -468,26 +542,13 @@ impl Integrator {
                 self.in_plane = false;
                 break;
             }
-            let begin = if works { planar.plane.power() } else { Powers::default() };
-            planar.plane.accept();
-            self.effort.took(runge_kutta::ORDER, dt, error);
+            self.effort.took(planar.plane.order(), dt, error);
             self.effort.planar = true;
             let due = watched && planar.is_due(dt);
-            if works {
-                planar.plane.look(0.5, &at(0.5 * dt));
-                let middle = planar.plane.power();
-                planar.plane.look(1.0, &at(dt));
-                // Simpson's rule
-                let work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(planar.plane.power(), dt / 6.0);
-                self.energy = self.energy.worked(&work);
-            } else if due || last {
-                planar.plane.look(1.0, &at(dt));
-            }
             if let Some((refiner, _)) = &mut self.refiners {
-                let size = planar.disturbance.size();
-                // cells that cannot be started stay as they were
-                if refiner.adapt_plane(&mut planar.plane, &at(dt)) == Ok(true) {
-                    planar.disturbance.begin(&planar.plane, size);
+                if refiner.adapt_plane(&mut planar.plane, &at(dt), self.energy.kinetic > self.rest) == Ok(true) {
+                    planar.disturbance.go_on(&planar.plane);
+                    self.energy = self.energy.now(&planar.plane.energy());
                 }
                 self.effort.space_error = self.effort.space_error.max(refiner.estimated());
             }
@@ -500,7 +561,6 @@ impl Integrator {
                 break;
             }
         }
-        self.energy = self.energy.now(&planar.plane.energy());
         time
     }
 
@@ -508,71 +568,119 @@ impl Integrator {
     /// too many.
     fn follow_in_space(&mut self, drive: &impl Fn(f64) -> Drive, mut time: f64, duration: f64) -> Result<(), Failed> {
         let shortest = self.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
+        let mut refuses = true;
         while time < duration {
             let rest = duration - time;
-            let (mut dt, _) = Pace { shortest, ..self.pace }.step(rest);
-            let tried = match self.attempt(drive, time, dt) {
-                Ok(Attempt { iterations, error, work }) => {
-                    self.effort.iterated(iterations);
-                    let Stepper { mesh, rod, .. } = &self.stepper;
-                    let attempted = self.stepper.attempted();
-                    let energy = self.energy.with(mesh, rod, attempted, &attempted.boundary.gravity, &work);
-                    let gain = energy.total() - self.energy.total() + work.lost - work.base - work.tip;
-                    let known = self.large + energy.kinetic + energy.elastic;
-                    let grows = gain > GAIN * self.pace.allowed * dt * known;
-                    let fits = self.pace.allows(dt, error);
-                    if fits && grows {
-                        self.pace.next = dt * LOST;
-                    }
-                    // what the shortest step cannot follow may be off, and the estimate tells by how much, but not grow
-                    let taken = (fits || dt <= shortest) && !grows;
-                    if taken {
-                        self.stepper.accept();
-                        self.energy = energy;
-                        self.effort.took(runge_kutta::ORDER, dt, error);
-                    }
-                    taken
-                }
-                Err(diverged) => {
-                    self.effort.iterated(diverged.iterations);
-                    self.pace.next = dt * LOST;
-                    false
-                }
+            let simple = self.simple.next >= rest;
+            let mut dt = if simple { rest } else { Pace { shortest, ..self.pace }.step(rest).0 };
+            let outcome = match simple {
+                true => self.attempt(&TR_BDF2, drive, (time, dt), (false, refuses)),
+                false => self.attempt(&ESDIRK4, drive, (time, dt), (dt <= shortest, refuses)),
             };
-            if !tried {
-                self.effort.retries = self.effort.retries.saturating_add(1);
-                if dt > shortest {
+            match outcome {
+                Outcome::Taken => {
+                    if !simple && dt == duration {
+                        self.simple.next *= HOPE;
+                    }
+                }
+                Outcome::TooCoarse(changed) => {
+                    refuses = changed;
                     continue;
                 }
-                self.pace.next = shortest;
-                // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
-                while self.step(drive, Kind::Damped, time, dt, MAX_HALVINGS).is_err() {
-                    if dt == rest {
-                        self.step(drive, Kind::Damped, time, dt, 0)?;
-                        break;
+                Outcome::TooLong if simple || dt > shortest => continue,
+                Outcome::TooLong => {
+                    self.pace.next = shortest;
+                    // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
+                    while self.step(drive, Kind::Damped, time, dt, MAX_HALVINGS).is_err() {
+                        if dt == rest {
+                            self.step(drive, Kind::Damped, time, dt, 0)?;
+                            break;
+                        }
+                        dt = (2.0 * dt).min(rest);
                     }
-                    dt = (2.0 * dt).min(rest);
                 }
             }
             time = if dt == rest { duration } else { time + dt };
+            let now = drive(time).boundary;
             if let Some((refiner, _)) = &mut self.refiners {
                 // cells that cannot be started stay as they were
-                refiner.adapt(&mut self.stepper, &drive(time).boundary).ok();
+                let changed = refiner.adapt(&mut self.stepper, &now, self.energy.kinetic > self.rest) == Ok(true);
                 self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+                if changed {
+                    self.see_energy(&now.gravity);
+                }
             }
         }
         Ok(())
     }
 
-    /// A step of order 4 in space from `time` on, with the accelerations made consistent first where they are not.
-    fn attempt(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, dt: f64) -> Result<Attempt, Diverged> {
+    /// Takes a step of `dt` s in space from `time` on, if it is good enough; one that `must` be is, as long as no energy
+    /// grows: what it cannot follow may be off, and the estimate tells by how much. Its cells count if it `refuses`.
+    fn attempt(
+        &mut self,
+        method: &'static RungeKutta,
+        drive: &impl Fn(f64) -> Drive,
+        (time, dt): (f64, f64),
+        (must, refuses): (bool, bool),
+    ) -> Outcome {
         let begin = drive(time).boundary;
+        let drift = self.drift * dt;
+        let pace = match method.order {
+            2 => {
+                self.simple.allowed = drift;
+                &mut self.simple
+            }
+            _ => &mut self.pace,
+        };
         let jumped = has_jumped(&self.stepper.state.boundary, &begin);
-        if jumped || self.stepper.state.dt > 0.0 {
-            self.stepper.accelerate(&begin)?;
+        let started = if jumped || self.stepper.state.dt > 0.0 { self.stepper.accelerate(&begin) } else { Ok(()) };
+        if jumped {
+            // gravity may be other than before
+            let Stepper { mesh, rod, state, .. } = &self.stepper;
+            self.energy = self.energy.now(&Energy::of(mesh, rod, state, &begin.gravity));
         }
-        let accuracy = self.pace.allowed * dt;
-        self.stepper.attempt(&|since: f64| drive(time + since).boundary, dt, accuracy)
+        let at = |since: f64| drive(time + since).boundary;
+        let attempted = started.and_then(|()| self.stepper.attempt(method, &at, dt, pace.allowed));
+        let Attempt { iterations, error, work } = match attempted {
+            Ok(attempt) => attempt,
+            Err(diverged) => {
+                pace.next = dt * LOST;
+                self.effort.iterated(diverged.iterations);
+                self.effort.retried();
+                return Outcome::TooLong;
+            }
+        };
+        let fits = pace.allows(dt, error);
+        self.effort.iterated(iterations);
+        let Stepper { mesh, rod, .. } = &self.stepper;
+        let state = self.stepper.attempted();
+        let energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
+        let grows = gain(&self.energy, &energy, &work, self.large) > GAIN * drift;
+        if fits && grows {
+            pace.next = dt * LOST;
+        }
+        if grows || !(fits || must) {
+            self.effort.retried();
+            return Outcome::TooLong;
+        }
+        if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
+            let refused = refiner.refuse(&mut self.stepper, &begin);
+            if refused != Ok(false) {
+                self.see_energy(&begin.gravity);
+                self.effort.retried();
+                return Outcome::TooCoarse(refused.is_ok());
+            }
+        }
+        self.stepper.accept();
+        self.energy = energy;
+        self.effort.took(method.order, dt, error);
+        Outcome::Taken
+    }
+
+    /// Reads the energies of the rod in space, which other cells have changed.
+    fn see_energy(&mut self, gravity: &Vec3) {
+        let Stepper { mesh, rod, state, .. } = &self.stepper;
+        self.energy = self.energy.now(&Energy::of(mesh, rod, state, gravity));
     }
 
     /// One step from `time`, or its two halves.
@@ -616,7 +724,7 @@ impl Integrator {
             }
             Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
             Err(cause) => {
-                self.effort.retries = self.effort.retries.saturating_add(1);
+                self.effort.retried();
                 self.effort.iterated(cause.iterations);
                 self.step(drive, kind, time, 0.5 * dt, halvings + 1)?;
                 self.step(drive, kind, time + 0.5 * dt, 0.5 * dt, halvings + 1)
@@ -714,6 +822,13 @@ impl Integrator {
     }
 }
 
+/// What a step in which `work` was done has added to the energy beyond that, relative to it, or to the `large` one, J, that
+/// gravity and bending can give.
+fn gain(before: &Energy, after: &Energy, work: &Powers, large: f64) -> f64 {
+    let gained = after.total() - before.total() + work.lost - work.base - work.tip;
+    gained / (large + after.kinetic + after.elastic)
+}
+
 /// Makes the rod in a plane that of `stepper`.
 fn write(plane: &mut Plane, stepper: &mut Stepper) {
     stepper.take_mesh(&plane.mesh().cells);
@@ -741,6 +856,10 @@ impl Effort {
         self.iterations = self.iterations.saturating_add(iterations as i32);
     }
 
+    fn retried(&mut self) {
+        self.retries = self.retries.saturating_add(1);
+    }
+
     fn took(&mut self, order: i32, dt: f64, error: f64) {
         self.steps = self.steps.saturating_add(1);
         (self.order, self.step, self.planar) = (order, dt, false);
@@ -754,9 +873,11 @@ mod tests {
 
     #[test]
     fn steps_follow_their_error() {
-        assert_eq!(stretch(0.0), CHANGE.1);
-        assert_eq!(stretch(1e30), CHANGE.0);
-        assert_eq!(stretch(f64::NAN), LOST);
-        assert!((stretch(1.0) - SAFETY).abs() < 1e-15);
+        for order in [2, 4, 5] {
+            assert_eq!(stretch(0.0, order), CHANGE.1);
+            assert_eq!(stretch(1e30, order), CHANGE.0);
+            assert_eq!(stretch(f64::NAN, order), LOST);
+            assert!((stretch(1.0, order) - SAFETY).abs() < 1e-15);
+        }
     }
 }

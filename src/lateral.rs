@@ -10,8 +10,8 @@
 //! ```
 //!
 //! with n and m of the motion in the plane. It is the virtual power of the rod in space to first order, but for the rotary
-//! inertia of the motion in the plane and its damping. Every Gauss point has an interval as long as its weight, with φ
-//! linear and the rest constant in it; in time it follows Newmark's method with γ = 1 and β = 9/16,
+//! inertia of the motion in the plane and its damping. Every Gauss point has an interval as long as its weight, or three
+//! where there are few, with φ linear and the rest constant in it; in time it follows Newmark's method with γ = 1 and β = 9/16,
 //!
 //! ```text
 //! y = y₀ + h y_t0 + h² ((½ − β) y_tt0 + β y_tt)          y_t = y_t0 + h y_tt
@@ -26,11 +26,15 @@ use crate::plane::{Lateral, Plane, Slice};
 use crate::pose::State;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::iter::repeat_n;
 
 /// 1/β.
 const WEIGHT: f64 = 16.0 / 9.0;
 /// Halvings of a step in which the disturbance grows.
 const HALVINGS: u32 = 6;
+
+/// Intervals up to which each is taken as three: of four a critical load is off by a tenth.
+const FEW: usize = 11;
 
 /// w and φ.
 type Vec3 = Vector3<f64>;
@@ -46,6 +50,16 @@ struct Motion {
 }
 
 impl Motion {
+    /// The part `x` of the way to another.
+    fn towards(&self, other: &Self, x: f64) -> Self {
+        let between = |a: Vec3, b: Vec3| a + (b - a) * x;
+        Self {
+            value: between(self.value, other.value),
+            rate: between(self.rate, other.rate),
+            rate_t: between(self.rate_t, other.rate_t),
+        }
+    }
+
     /// After a step of `h` s to `value`.
     fn to(&self, value: Vec3, h: f64) -> Self {
         let rate_t = value * (WEIGHT / (h * h)) - self.known(h);
@@ -65,40 +79,83 @@ struct Pivot {
     gain: SMatrix<f64, 2, 3>,
 }
 
+/// The intervals of a rod in a plane from base to tip.
+fn intervals(plane: &Plane) -> impl DoubleEndedIterator<Item = Slice> {
+    let each = if plane.slices().len() > FEW { 1 } else { 3 };
+    let part = move |slice: Slice| repeat_n(Slice { length: slice.length / each as f64, ..slice }, each);
+    plane.slices().flat_map(part)
+}
+
 /// The disturbance of a rod in a plane, with its storage.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
     points: Vec<Motion>,
     tip: Motion,
     pivots: Vec<Pivot>,
+    /// Arc lengths of the points, m; and these and the points of the last mesh.
+    arcs: Vec<f64>,
+    before: (Vec<f64>, Vec<Motion>),
 }
 
 impl Disturbance {
     /// Room for that of a rod with so many Gauss points at most; [`Self::begin`] comes next.
     pub fn new(points: usize) -> Self {
-        Self { points: Vec::with_capacity(points), tip: Motion::default(), pivots: Vec::with_capacity(points) }
+        let most = points.max(3 * FEW);
+        let (room, arcs) = (|| Vec::with_capacity(most), || Vec::with_capacity(most));
+        let (tip, pivots) = (Motion::default(), Vec::with_capacity(most));
+        Self { points: room(), tip, pivots, arcs: arcs(), before: (arcs(), room()) }
     }
 
     /// Begins anew, at rest, on the rod where `plane` looks at: with turns that grow from the base to `size` at the tip.
     pub fn begin(&mut self, plane: &Plane, size: f64) {
         let at = |w: f64, turn: f64| Motion { value: Vec3::new(w, turn, turn), ..Motion::default() };
-        self.points.resize(plane.slices().len(), Motion::default());
-        self.pivots.resize(plane.slices().len(), Pivot::default());
+        self.measure(plane);
         let grown = size * FRAC_1_SQRT_2 / plane.slices().map(|slice| slice.length).sum::<f64>();
-        let (mut w, mut arc) = (0.0, 0.0);
-        for (slice, point) in plane.slices().zip(&mut self.points) {
+        let mut w = 0.0;
+        for ((slice, point), arc) in intervals(plane).zip(&mut self.points).zip(&self.arcs) {
             let Slice { length, tangent: [cos, sin], .. } = slice;
-            arc += 0.5 * length;
             let half = -0.5 * length * grown * arc * (cos - sin);
             *point = at(w + half, grown * arc);
-            (w, arc) = (w + 2.0 * half, arc + 0.5 * length);
+            w += 2.0 * half;
         }
         self.tip = at(w, size * FRAC_1_SQRT_2);
+    }
+
+    /// Makes room on the points of `plane`.
+    fn measure(&mut self, plane: &Plane) {
+        self.arcs.clear();
+        let mut arc = 0.0;
+        self.arcs.extend(intervals(plane).map(|slice| {
+            arc += slice.length;
+            arc - 0.5 * slice.length
+        }));
+        self.points.resize(self.arcs.len(), Motion::default());
+        self.pivots.resize(self.arcs.len(), Pivot::default());
+    }
+
+    /// Goes on in another mesh of the same rod, linear between its points.
+    pub fn go_on(&mut self, plane: &Plane) {
+        std::mem::swap(&mut self.before.0, &mut self.arcs);
+        std::mem::swap(&mut self.before.1, &mut self.points);
+        self.measure(plane);
+        let length: f64 = plane.slices().map(|slice| slice.length).sum();
+        let (arcs, points) = (&self.before.0, &self.before.1);
+        let mut next = 0;
+        for (arc, point) in self.arcs.iter().zip(&mut self.points) {
+            while next < arcs.len() && arcs[next] < *arc {
+                next += 1;
+            }
+            // nothing moves at the base
+            let (from, begin) = if next == 0 { (0.0, Motion::default()) } else { (arcs[next - 1], points[next - 1]) };
+            let (to, end) = arcs.get(next).map_or((length, self.tip), |to| (*to, points[next]));
+            *point = begin.towards(&end, (arc - from) / (to - from));
+        }
     }
 
     /// Copies, without allocating where there is room for as many points.
     pub fn copy_from(&mut self, other: &Self) {
         self.points.clone_from(&other.points);
+        self.arcs.clone_from(&other.arcs);
         self.pivots.resize(other.points.len(), Pivot::default());
         self.tip = other.tip;
     }
@@ -134,7 +191,8 @@ impl Disturbance {
         let body = Vec3::new(tip_mass, tip_inertia, tip_inertia);
         let mut stiffness = Matrix3::from_diagonal(&(body * weight));
         let mut load = body.component_mul(&self.tip.known(h));
-        for ((slice, point), pivot) in plane.slices().zip(&self.points).zip(&mut self.pivots).rev() {
+        let parts = intervals(plane).rev().zip(self.points.iter().rev()).zip(self.pivots.iter_mut().rev());
+        for ((slice, point), pivot) in parts {
             let Slice { length, tangent: d, force: n, moment: m } = slice;
             let (d, across) = (Vector2::from(d), Vector2::new(-d[1], d[0]));
             let n = Vector2::from(n);
@@ -178,7 +236,7 @@ impl Disturbance {
         }
 
         let mut x = Vec3::zeros();
-        for ((slice, point), Pivot { constant, gain }) in plane.slices().zip(&mut self.points).zip(&self.pivots) {
+        for ((slice, point), Pivot { constant, gain }) in intervals(plane).zip(&mut self.points).zip(&self.pivots) {
             let Slice { length, tangent: [cos, sin], .. } = slice;
             let u = constant - gain * x;
             let middle = x.yz() + u * 0.5;
@@ -193,9 +251,11 @@ impl Disturbance {
     /// Adds `part` of its rates to the spins of `state`, which is that of `plane` in space, or as much of them as changes no
     /// spin by more than `most` rad/s.
     pub fn disturb(&self, plane: &Plane, part: f64, most: f64, state: &mut State) {
-        let rates = || self.points.iter().chain([&self.tip]).map(|motion| motion.rate.yz().norm());
-        let part = part.min(most / rates().fold(0.0, f64::max));
-        for (i, motion) in self.points.iter().chain([&self.tip]).enumerate() {
+        let each = self.points.len() / plane.slices().len();
+        // the Gauss points are the middles
+        let motions = || self.points.iter().skip(each / 2).step_by(each).chain([&self.tip]);
+        let part = part.min(most / motions().map(|motion| motion.rate.yz().norm()).fold(0.0, f64::max));
+        for (i, motion) in motions().enumerate() {
             let spin = plane.in_world([motion.rate.y * part, motion.rate.z * part]);
             let turned = state.remembering(i).rotation.tr_mul(&spin);
             state.memory[i].spin.velocity.value += turned;

@@ -875,7 +875,21 @@ impl Plane {
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.before, &mut self.now);
         std::mem::swap(&mut self.now, &mut self.next);
-        (self.ends, self.drive, self.seen) = (self.next_ends, self.next_drive, None);
+        self.exchange_ends();
+    }
+
+    /// Takes [`Self::accept`] back: the beginning of that step is the present again, and its end the attempt. There is no
+    /// looking back into the step before.
+    pub(crate) fn take_back(&mut self) {
+        std::mem::swap(&mut self.now, &mut self.next);
+        std::mem::swap(&mut self.before, &mut self.now);
+        self.exchange_ends();
+    }
+
+    fn exchange_ends(&mut self) {
+        std::mem::swap(&mut self.ends, &mut self.next_ends);
+        std::mem::swap(&mut self.drive, &mut self.next_drive);
+        self.seen = None;
     }
 
     fn rates_of(&self, now: &Drive, drive: &impl Fn(f64) -> Drive, h: f64) -> EndRates {
@@ -1195,6 +1209,16 @@ impl Plane {
             }
         }
         self.see(drive);
+    }
+
+    /// Whether the instant last looked at is the present.
+    pub fn is_seen(&self) -> bool {
+        self.seen.is_some()
+    }
+
+    /// Order of its steps.
+    pub fn order(&self) -> i32 {
+        self.method.order as i32
     }
 
     fn see(&mut self, drive: &Drive) {

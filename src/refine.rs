@@ -24,8 +24,8 @@
 //!
 //! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; two
 //! cells are joined by their mean square best approximation. Both leave the tip and its velocity where they are, to the
-//! order of e. Still a change raises some waves, and is the better for being made in time: cells are halved long before
-//! they have used up what the tolerance allows, and joined long after.
+//! order of e. Still a change raises some waves, and is the better for being made in time: cells are halved before they have
+//! used up what the tolerance allows, and joined long after; a step that leaves too little is taken anew on finer ones.
 
 // J is a matrix
 #![allow(non_snake_case)]
@@ -46,11 +46,14 @@ type Vec3 = Vector3<f64>;
 /// and one that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and less
 /// than it for the small waves of a wire below 1e-6.
 const CALIBRATION: f64 = 2.0;
-/// Part of the tolerance that the cells may use up before they are halved: with a quarter a whip of 25 halvings in a
-/// second raised waves that asked for ever more.
-const SHARE: f64 = 0.15;
+/// Part of the tolerance that the cells may use up before they are halved. With a tenth a hair that whips raises more waves
+/// by its changes than it is the more exact.
+const SHARE: f64 = 0.25;
 /// Part of that which a pair of cells must keep below once joined.
-const JOINED: f64 = 0.001;
+const JOINED: f64 = 0.02;
+/// Times what a cell may use up at which the step that has brought it there is taken back. A blow or a jerk to a hanging
+/// cord costs at most the tolerance then, and up to 5 times that with a factor of 10.
+const REFUSED: f64 = 2.0;
 /// Calls without a change after one: the waves that it has raised are to fade.
 const REST: u32 = 4;
 /// Part of the error of a cell that is remembered at the next call, lest cells that have a moment's rest be joined.
@@ -91,9 +94,8 @@ impl Refiner {
     /// For rods on `coarsest`, or what becomes of it: none of its cells will be joined, and there will be `most_cells` at
     /// most. `tolerance` is that of the tip's position, over the length.
     ///
-    /// A rod at rest may be straight, and tell nothing of what will come: a quarter of the cells that a load of the kind it
-    /// has will want, by any rule, are coarse enough. From one cell the first blow to a hanging cord costs 4e-3 of its
-    /// length, from two 1e-4.
+    /// A rod at rest may be straight, and tells nothing of what will come: the step that tells is to be
+    /// [refused](Self::refuse). Otherwise the first blow to a hanging cord of one cell costs 4e-3 of its length.
     pub fn new(coarsest: &Mesh, tolerance: f64, most_cells: usize) -> Self {
         let most_cells = most_cells.max(coarsest.cells.len());
         let room = || Vec::with_capacity(most_cells);
@@ -151,6 +153,10 @@ impl Refiner {
     /// Estimated error of the tip's position, over the length, that comes of the present cells.
     pub fn estimate_space(&mut self, stepper: &Stepper) -> f64 {
         let Stepper { mesh, rod, state, .. } = stepper;
+        self.estimate_state(mesh, rod, state)
+    }
+
+    fn estimate_state(&mut self, mesh: &Mesh, rod: &Rod, state: &State) -> f64 {
         let stages = mesh.rule.stages;
         self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), |series, j| {
             let (node, next) = (&state.nodes[j], &state.nodes[j + 1]);
@@ -200,10 +206,10 @@ impl Refiner {
     }
 
     /// Takes the errors into account; whether it is time to change the cells, and they should.
-    fn due(&mut self, mesh: &Mesh) -> bool {
+    fn due(&mut self, mesh: &Mesh, joins: bool) -> bool {
         self.remember(mesh.cells.len());
         self.waited = self.waited.saturating_add(1);
-        self.waited > REST && self.plan(mesh, true)
+        self.waited > REST && self.plan(mesh, joins)
     }
 
     fn remember(&mut self, count: usize) {
@@ -220,7 +226,7 @@ impl Refiner {
     fn plan(&mut self, mesh: &Mesh, joins: bool) -> bool {
         let count = mesh.cells.len();
         self.find_places(mesh);
-        let allowed = SHARE * self.tolerance / count as f64;
+        let allowed = self.allowed(count);
         // of a cell twice as long
         let growth = 4f64.powi(self.rule.stages as i32);
         let mut room = self.most_cells - count.min(self.most_cells);
@@ -278,16 +284,16 @@ impl Refiner {
         }
     }
 
-    /// Refines and coarsens the cells of a rod that neither shears nor stretches, clamped at its base and free at its
+    /// Refines and, if it `joins`, coarsens the cells of a rod that neither shears nor stretches, clamped at its base and free at its
     /// tip; whether they have changed. Others keep their cells. `boundary` is what acts now; the accelerations are
     /// consistent with it afterwards, as after [`Stepper::accelerate`], and [`Stepper::previous`] is lost.
     ///
     /// # Errors
     /// [`Diverged`] if the equations of a cell are singular; the rod is as before.
-    pub fn adapt(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Diverged> {
+    pub fn adapt(&mut self, stepper: &mut Stepper, boundary: &Boundary, joins: bool) -> Result<bool, Diverged> {
         self.estimate_space(stepper);
         let unfit = stepper.rod.is_extensible() || boundary.holds_positions();
-        if unfit || !self.due(&stepper.mesh) {
+        if unfit || !self.due(&stepper.mesh, joins) {
             return Ok(false);
         }
         self.change(stepper, boundary)?;
@@ -298,15 +304,65 @@ impl Refiner {
     ///
     /// # Errors
     /// [`Singular`] as of [`Plane::start`]; the rod is as before.
-    pub fn adapt_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Singular> {
+    pub fn adapt_plane(&mut self, plane: &mut Plane, drive: &Drive, joins: bool) -> Result<bool, Singular> {
         plane.look(1.0, drive);
         self.estimate_plane(plane);
-        if !self.due(plane.mesh()) {
+        if !self.due(plane.mesh(), joins) {
             return Ok(false);
         }
+        self.change_plane(plane, drive)?;
+        Ok(true)
+    }
+
+    /// Whether the step that `stepper` has attempted ends in errors that its cells ought not to have had: then the present
+    /// state has finer ones, under `boundary`, and the step is to be attempted again. Cells that wait at rest for a blow
+    /// are few.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Self::adapt`]; the attempt is lost.
+    pub fn refuse(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Diverged> {
+        let Stepper { mesh, rod, .. } = &*stepper;
+        self.estimate_state(mesh, rod, stepper.attempted());
+        if !self.refuses(&stepper.mesh) {
+            return Ok(false);
+        }
+        self.change(stepper, boundary)?;
+        Ok(true)
+    }
+
+    /// The same of a step in a plane that is accepted, and of which the end is seen: it is taken back.
+    ///
+    /// # Errors
+    /// [`Singular`] as of [`Plane::start`]; the step is taken back all the same.
+    pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Singular> {
+        self.estimate_plane(plane);
+        if !self.refuses(plane.mesh()) {
+            return Ok(false);
+        }
+        plane.take_back();
+        self.change_plane(plane, drive)?;
+        Ok(true)
+    }
+
+    fn refuses(&mut self, mesh: &Mesh) -> bool {
+        let most = REFUSED * self.allowed(mesh.cells.len());
+        let fit = |(error, turn): (&f64, &f64)| *error <= most && *turn < MOST_TURN[0];
+        if self.errors.iter().zip(&self.turns).all(fit) {
+            return false;
+        }
+        self.remember(mesh.cells.len());
+        self.plan(mesh, false)
+    }
+
+    /// The error that each of so many cells may have.
+    fn allowed(&self, cells: usize) -> f64 {
+        SHARE * self.tolerance / cells as f64
+    }
+
+    fn change_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<(), Singular> {
         plane.remesh(&mut self.cells, &self.origins, &self.series, drive)?;
         self.changed();
-        Ok(true)
+        Ok(())
     }
 
     /// The static equilibrium under `boundary`, on cells as fine as the tolerance asks for, and as Newton needs.

@@ -1,4 +1,4 @@
-//! A Runge-Kutta method of high order. It knows numbers and no rod.
+//! Runge-Kutta methods with implicit stages of one kind. They know numbers and no rod.
 //!
 //! ```text
 //! Yᵢ = y₀ + h Σ_{j≤i} aᵢⱼ Y'ⱼ          a₁₁ = 0, aᵢᵢ = γ          y₁ = Y_s
@@ -6,8 +6,8 @@
 //!
 //! The first stage is the beginning of the step, every other one an implicit equation of the kind that one step of
 //! implicit Euler solves. The second stage and all later ones are of order 2 in themselves, so that what is too stiff to
-//! be followed does not spoil the order of the rest; the last one is the step (stiffly accurate) and the method is
-//! L-stable: what it cannot follow rests. Applied to x' = v and v' = a in turn it gives both rates of a stage from its x,
+//! be followed does not spoil the order of the rest; the last one is the step (stiffly accurate) and the methods are
+//! L-stable: what they cannot follow rests. Applied to x' = v and v' = a in turn it gives both rates of a stage from its x,
 //!
 //! ```text
 //! v = w (x − x₀ − h Σ_{j<i} aᵢⱼ vⱼ)      a = w (v − v₀ − h Σ_{j<i} aᵢⱼ aⱼ)      w = 1/(γ h)
@@ -16,70 +16,107 @@
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 
-/// s, the explicit first stage included.
-pub const STAGES: usize = 6;
-/// Order of the step.
-pub const ORDER: i32 = 4;
-/// γ.
-pub const GAMMA: f64 = 0.25;
+/// Most stages of a method.
+pub const MAX_STAGES: usize = 6;
 
-/// aᵢⱼ, j < i, of `ESDIRK4(3)6L[2]SA`: C. A. Kennedy, M. H. Carpenter: Diagonally Implicit Runge-Kutta Methods for Ordinary
-/// Differential Equations, a Review, NASA/TM-2016-219173, table 16.
-pub const A: [[f64; STAGES]; STAGES] = [
-    [0.0; STAGES],
-    [0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
-    [(1.0 - SQRT_2) / 8.0, (1.0 - SQRT_2) / 8.0, 0.0, 0.0, 0.0, 0.0],
-    [(5.0 - 7.0 * SQRT_2) / 64.0, (5.0 - 7.0 * SQRT_2) / 64.0, 7.0 * (1.0 + SQRT_2) / 32.0, 0.0, 0.0, 0.0],
-    [
-        (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
-        (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
-        (506_605.0 + 132_109.0 * SQRT_2) / 437_500.0,
-        166.0 * (-97.0 + 376.0 * SQRT_2) / 109_375.0,
-        0.0,
-        0.0,
-    ],
-    [
-        (1181.0 - 987.0 * SQRT_2) / 13_782.0,
-        (1181.0 - 987.0 * SQRT_2) / 13_782.0,
-        47.0 * (-267.0 + 1783.0 * SQRT_2) / 273_343.0,
-        -16.0 * (-22_922.0 + 3525.0 * SQRT_2) / 571_953.0,
-        -15_625.0 * (97.0 + 376.0 * SQRT_2) / 90_749_876.0,
-        0.0,
-    ],
-];
+type Row = [f64; MAX_STAGES];
 
-/// cᵢ: where in the step the stages stand.
-pub const C: [f64; STAGES] = [0.0, 0.5, (2.0 - SQRT_2) / 4.0, 0.625, 1.04, 1.0];
-
-/// The weights of an embedded step of order 3 (same source).
-const EMBEDDED: [f64; STAGES] = [
-    -480_923_228_411.0 / 4_982_971_448_372.0,
-    -480_923_228_411.0 / 4_982_971_448_372.0,
-    6_709_447_293_961.0 / 12_833_189_095_359.0,
-    3_513_175_791_894.0 / 6_748_737_351_361.0,
-    -498_863_281_070.0 / 6_042_575_550_617.0,
-    2_077_005_547_802.0 / 8_945_017_530_137.0,
-];
-
-/// Weight of Y'ⱼ in the step.
-pub fn weight(j: usize) -> f64 {
-    if j == STAGES - 1 { GAMMA } else { A[STAGES - 1][j] }
+/// The coefficients of a method; those of stages that it has not are 0.
+#[derive(Debug, PartialEq)]
+pub struct RungeKutta {
+    /// s, the explicit first stage included.
+    pub stages: usize,
+    /// Order of the step.
+    pub order: i32,
+    /// γ.
+    pub gamma: f64,
+    /// aᵢⱼ, j < i.
+    pub a: [Row; MAX_STAGES],
+    /// cᵢ: where in the step the stages stand.
+    pub c: Row,
+    /// The weights of an embedded step of another order.
+    embedded: Row,
 }
 
-/// Weight of Y'ⱼ in the difference of the step and the embedded one, which estimates the latter's error.
-pub fn error_weight(j: usize) -> f64 {
-    weight(j) - EMBEDDED[j]
-}
+/// `ESDIRK4(3)6L[2]SA`, of order 4 and, embedded, 3: C. A. Kennedy, M. H. Carpenter: Diagonally Implicit Runge-Kutta
+/// Methods for Ordinary Differential Equations, a Review, NASA/TM-2016-219173, table 16.
+pub static ESDIRK4: RungeKutta = RungeKutta {
+    stages: 6,
+    order: 4,
+    gamma: 0.25,
+    a: [
+        [0.0; MAX_STAGES],
+        [0.25, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [(1.0 - SQRT_2) / 8.0, (1.0 - SQRT_2) / 8.0, 0.0, 0.0, 0.0, 0.0],
+        [(5.0 - 7.0 * SQRT_2) / 64.0, (5.0 - 7.0 * SQRT_2) / 64.0, 7.0 * (1.0 + SQRT_2) / 32.0, 0.0, 0.0, 0.0],
+        [
+            (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
+            (-13_796.0 - 54_539.0 * SQRT_2) / 125_000.0,
+            (506_605.0 + 132_109.0 * SQRT_2) / 437_500.0,
+            166.0 * (-97.0 + 376.0 * SQRT_2) / 109_375.0,
+            0.0,
+            0.0,
+        ],
+        [
+            (1181.0 - 987.0 * SQRT_2) / 13_782.0,
+            (1181.0 - 987.0 * SQRT_2) / 13_782.0,
+            47.0 * (-267.0 + 1783.0 * SQRT_2) / 273_343.0,
+            -16.0 * (-22_922.0 + 3525.0 * SQRT_2) / 571_953.0,
+            -15_625.0 * (97.0 + 376.0 * SQRT_2) / 90_749_876.0,
+            0.0,
+        ],
+    ],
+    c: [0.0, 0.5, (2.0 - SQRT_2) / 4.0, 0.625, 1.04, 1.0],
+    embedded: [
+        -480_923_228_411.0 / 4_982_971_448_372.0,
+        -480_923_228_411.0 / 4_982_971_448_372.0,
+        6_709_447_293_961.0 / 12_833_189_095_359.0,
+        3_513_175_791_894.0 / 6_748_737_351_361.0,
+        -498_863_281_070.0 / 6_042_575_550_617.0,
+        2_077_005_547_802.0 / 8_945_017_530_137.0,
+    ],
+};
 
-/// Weights of the stages before stage `i` in what goes on from them: the polynomial through the last `count`, or as many
-/// as there are, at cᵢ.
-pub fn onward(i: usize, count: usize) -> [f64; STAGES] {
-    let mut weights = [0.0; STAGES];
-    let last = i.saturating_sub(count)..i;
-    for j in last.clone() {
-        weights[j] = last.clone().filter(|k| *k != j).map(|k| (C[i] - C[k]) / (C[j] - C[k])).product();
+/// TR-BDF2, of order 2 and, embedded, 3: M. E. Hosea, L. F. Shampine: Analysis and implementation of TR-BDF2, Applied
+/// Numerical Mathematics 20, 1996.
+pub static TR_BDF2: RungeKutta = RungeKutta {
+    stages: 3,
+    order: 2,
+    gamma: 1.0 - SQRT_2 / 2.0,
+    a: [
+        [0.0; MAX_STAGES],
+        [1.0 - SQRT_2 / 2.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        [SQRT_2 / 4.0, SQRT_2 / 4.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0; MAX_STAGES],
+        [0.0; MAX_STAGES],
+        [0.0; MAX_STAGES],
+    ],
+    c: [0.0, 2.0 - SQRT_2, 1.0, 0.0, 0.0, 0.0],
+    embedded: [(1.0 - SQRT_2 / 4.0) / 3.0, (1.0 + 3.0 * SQRT_2 / 4.0) / 3.0, (1.0 - SQRT_2 / 2.0) / 3.0, 0.0, 0.0, 0.0],
+};
+
+impl RungeKutta {
+    /// Weight of Y'ⱼ in the step.
+    pub fn weight(&self, j: usize) -> f64 {
+        if j == self.stages - 1 { self.gamma } else { self.a[self.stages - 1][j] }
     }
-    weights
+
+    /// Weight of Y'ⱼ in the difference of the step and the embedded one, which estimates the error of the one of lower order.
+    pub fn error_weight(&self, j: usize) -> f64 {
+        self.weight(j) - self.embedded[j]
+    }
+
+    /// Weights of the stages before stage `i` in what goes on from them: the polynomial through the last `count`, or as
+    /// many as there are, at cᵢ.
+    pub fn onward(&self, i: usize, count: usize) -> [f64; MAX_STAGES] {
+        let c = &self.c;
+        let mut weights = [0.0; MAX_STAGES];
+        let last = i.saturating_sub(count)..i;
+        for j in last.clone() {
+            weights[j] = last.clone().filter(|k| *k != j).map(|k| (c[i] - c[k]) / (c[j] - c[k])).product();
+        }
+        weights
+    }
 }
 
 /// y, y' and y'' at the fraction x of a step of `h` between the same at its ends: the polynomial of degree 5 through them.
@@ -108,42 +145,46 @@ pub fn slope_between(growth: &Vector3<f64>, [begin, end]: [&Vector3<f64>; 2], h:
 mod tests {
     use super::*;
 
-    /// aᵢⱼ with the diagonal.
-    fn a(i: usize, j: usize) -> f64 {
-        if i == j && i > 0 { GAMMA } else { A[i][j] }
-    }
+    const METHODS: [&RungeKutta; 2] = [&ESDIRK4, &TR_BDF2];
 
-    fn times(x: &[f64; STAGES]) -> [f64; STAGES] {
-        std::array::from_fn(|i| (0..STAGES).map(|j| a(i, j) * x[j]).sum())
+    /// A x, with the diagonal.
+    fn times(method: &RungeKutta, x: &Row) -> Row {
+        let a =
+            |i: usize, j: usize| if i == j && (1..method.stages).contains(&i) { method.gamma } else { method.a[i][j] };
+        std::array::from_fn(|i| (0..MAX_STAGES).map(|j| a(i, j) * x[j]).sum())
     }
 
     #[test]
     fn conditions_of_order_hold() {
-        let one = [1.0; STAGES];
-        let by = |x: &[f64; STAGES], y: &[f64; STAGES]| -> [f64; STAGES] { std::array::from_fn(|i| x[i] * y[i]) };
-        let ac = times(&C);
-        let c2 = by(&C, &C);
-        // the trees of order 1 to 3, then of order 4
-        let trees = [
-            (one, 1.0),
-            (C, 2.0),
-            (c2, 3.0),
-            (ac, 6.0),
-            (by(&c2, &C), 4.0),
-            (by(&C, &ac), 8.0),
-            (times(&c2), 12.0),
-            (times(&ac), 24.0),
-        ];
-        for (n, (tree, order)) in trees.iter().enumerate() {
-            let sum: f64 = (0..STAGES).map(|j| weight(j) * tree[j]).sum();
-            let embedded: f64 = (0..STAGES).map(|j| EMBEDDED[j] * tree[j]).sum();
-            // roundings of coefficients of size 1
-            assert!((sum - 1.0 / order).abs() < 1e-14, "tree {n}");
-            assert_eq!((embedded - 1.0 / order).abs() < 1e-14, n < 4, "embedded, tree {n}");
-        }
-        for i in 1..STAGES {
-            // stages of order 2
-            assert!((times(&one)[i] - C[i]).abs() < 1e-14 && (ac[i] - 0.5 * c2[i]).abs() < 1e-14, "stage {i}");
+        for method in METHODS {
+            let RungeKutta { stages, order, c, embedded, .. } = method;
+            let one: Row = std::array::from_fn(|i| f64::from(i < *stages));
+            let by = |x: &Row, y: &Row| -> Row { std::array::from_fn(|i| x[i] * y[i]) };
+            let (ac, c2) = (times(method, c), by(c, c));
+            // the trees, and of which order they are
+            let trees = [
+                (1, one, 1.0),
+                (2, *c, 2.0),
+                (3, c2, 3.0),
+                (3, ac, 6.0),
+                (4, by(&c2, c), 4.0),
+                (4, by(c, &ac), 8.0),
+                (4, times(method, &c2), 12.0),
+                (4, times(method, &ac), 24.0),
+            ];
+            for (n, (tree_order, tree, value)) in trees.iter().enumerate() {
+                let holds = |weight: &dyn Fn(usize) -> f64| {
+                    let sum: f64 = (0..*stages).map(|j| weight(j) * tree[j]).sum();
+                    // roundings of coefficients of size 1
+                    (sum - 1.0 / value).abs() < 1e-14
+                };
+                assert_eq!(holds(&|j| method.weight(j)), tree_order <= order, "order {order}, tree {n}");
+                assert_eq!(holds(&|j| embedded[j]), *tree_order <= 3, "order {order}, embedded, tree {n}");
+            }
+            for i in 1..*stages {
+                // stages of order 2
+                assert!((times(method, &one)[i] - c[i]).abs() < 1e-14 && (ac[i] - 0.5 * c2[i]).abs() < 1e-14, "{i}");
+            }
         }
     }
 
@@ -171,29 +212,32 @@ mod tests {
 
     #[test]
     fn what_is_smooth_goes_on() {
-        for i in 1..STAGES {
-            for count in 1..=3 {
-                let weights = onward(i, count);
-                for degree in 0..i.min(count) as i32 {
-                    let sum: f64 = (0..STAGES).map(|j| weights[j] * C[j].powi(degree)).sum();
-                    assert!((sum - C[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+        for method in METHODS {
+            let c = &method.c;
+            for i in 1..method.stages {
+                for count in 1..=3 {
+                    let weights = method.onward(i, count);
+                    for degree in 0..i.min(count) as i32 {
+                        let sum: f64 = (0..i).map(|j| weights[j] * c[j].powi(degree)).sum();
+                        assert!((sum - c[i].powi(degree)).abs() < 1e-13, "stage {i}, degree {degree}");
+                    }
                 }
             }
         }
     }
 
     #[test]
-    fn it_damps_what_it_cannot_follow_and_nothing_grows() {
+    fn they_damp_what_they_cannot_follow_and_nothing_grows() {
         // |R(iy)| of y' = i y: stages by forward substitution in complex numbers
-        let factor = |y: f64| {
-            let mut rates = [(0.0, 0.0); STAGES];
+        let factor = |method: &RungeKutta, y: f64| {
+            let mut rates = [(0.0, 0.0); MAX_STAGES];
             let mut last = (1.0, 0.0);
-            for i in 0..STAGES {
+            for i in 0..method.stages {
                 let mut known = (1.0, 0.0);
                 for j in 0..i {
-                    known = (known.0 + A[i][j] * rates[j].0, known.1 + A[i][j] * rates[j].1);
+                    known = (known.0 + method.a[i][j] * rates[j].0, known.1 + method.a[i][j] * rates[j].1);
                 }
-                let d = if i == 0 { 0.0 } else { GAMMA * y };
+                let d = if i == 0 { 0.0 } else { method.gamma * y };
                 // Y = known / (1 − i d)
                 let scale = 1.0 / (1.0 + d * d);
                 last = ((known.0 - d * known.1) * scale, (known.1 + d * known.0) * scale);
@@ -201,10 +245,12 @@ mod tests {
             }
             f64::hypot(last.0, last.1)
         };
-        for step in 1..2000 {
-            let y = 1.02f64.powi(step - 1000);
-            assert!(factor(y) <= 1.0 + 1e-12, "{y}: {}", factor(y));
+        for method in METHODS {
+            for step in 1..2000 {
+                let y = 1.02f64.powi(step - 1000);
+                assert!(factor(method, y) <= 1.0 + 1e-12, "{y}: {}", factor(method, y));
+            }
+            assert!(factor(method, 1e8) < 1e-6);
         }
-        assert!(factor(1e8) < 1e-6);
     }
 }

@@ -12,7 +12,7 @@ use crate::energy::Powers;
 use crate::mesh::{Cell, Mesh};
 use crate::pose::{self, Known, Row, Section, State, Time};
 use crate::rod::Rod;
-use crate::runge_kutta;
+use crate::runge_kutta::{self, RungeKutta};
 use crate::so3;
 use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System, larger};
 use nalgebra::Vector3;
@@ -204,14 +204,15 @@ pub struct Stepper {
     guess: State,
     /// Within the last step of order 4.
     seen: State,
-    /// Its length, s.
+    /// Its length, s, and method.
     span: f64,
+    method: &'static RungeKutta,
     system: System,
     sweep: Sweep,
     /// The rates at the stages of a step of order 4, of everything that has a history.
-    stages: Vec<[Rates; runge_kutta::STAGES]>,
+    stages: Vec<[Rates; runge_kutta::MAX_STAGES]>,
     /// What the sections carry there, of the nodes and then of the points.
-    carried: Vec<[Carried; runge_kutta::STAGES]>,
+    carried: Vec<[Carried; runge_kutta::MAX_STAGES]>,
 }
 
 impl Stepper {
@@ -228,6 +229,7 @@ impl Stepper {
             guess: state.clone(),
             seen: state.clone(),
             span: 0.0,
+            method: &runge_kutta::ESDIRK4,
             state,
             mesh,
             rod,
@@ -393,7 +395,7 @@ impl Stepper {
         Ok(report)
     }
 
-    /// Computes a step of `h` s of order 4 ([`runge_kutta`]) under `drive`, what acts as a function of the time since its
+    /// Computes a step of `h` s by a method of [`runge_kutta`] under `drive`, what acts as a function of the time since its
     /// beginning; [`Self::accept`] takes it. The present accelerations must be consistent with what acts
     /// ([`Self::accelerate`]). For a rod that neither shears nor stretches, clamped at its base and free at its tip.
     ///
@@ -401,19 +403,25 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Diverged`]; nothing has changed.
-    pub fn attempt(&mut self, drive: &impl Fn(f64) -> Boundary, h: f64, accuracy: f64) -> Result<Attempt, Diverged> {
-        let weight = 1.0 / (runge_kutta::GAMMA * h);
+    pub fn attempt(
+        &mut self,
+        method: &'static RungeKutta,
+        drive: &impl Fn(f64) -> Boundary,
+        h: f64,
+        accuracy: f64,
+    ) -> Result<Attempt, Diverged> {
+        let weight = 1.0 / (method.gamma * h);
         let time = Time::Stage { weight };
-        self.span = h;
+        (self.span, self.method) = (h, method);
         self.old.copy_from(&self.state);
         self.trial.copy_from(&self.state);
         let begin = drive(0.0);
         self.take_rates(0, weight);
-        let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * runge_kutta::weight(0));
+        let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * method.weight(0));
         let mut iterations = 0;
         let mut factors = Factors::Missing;
-        for i in 1..runge_kutta::STAGES {
-            let boundary = drive(runge_kutta::C[i] * h);
+        for i in 1..method.stages {
+            let boundary = drive(method.c[i] * h);
             for guess in [Guess::Smooth, Guess::Near] {
                 self.prepare_stage(i, h, weight, &boundary, guess);
                 match self.stage(&boundary, &time, accuracy, &mut factors) {
@@ -430,11 +438,11 @@ impl Stepper {
                     }
                 }
             }
-            let last = i == runge_kutta::STAGES - 1;
+            let last = i == method.stages - 1;
             let settle = if last { State::settle } else { State::settle_within };
             settle(&mut self.trial, &self.mesh, &self.rod, &self.old, &boundary, &time);
             self.take_rates(i, weight);
-            work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * runge_kutta::weight(i));
+            work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * method.weight(i));
         }
         let error = self.error(h);
         if !(self.trial.is_finite() && error.is_finite()) {
@@ -457,13 +465,13 @@ impl Stepper {
     /// the equations of motion: positions and velocities to order 4, accelerations and with them n and m to order 3. Good
     /// until the next step or equilibrium; nothing but what is returned has changed.
     pub fn look(&mut self, fraction: f64, boundary: &Boundary) -> &State {
-        let Self { mesh, rod, old, stages, seen, span, .. } = self;
+        let Self { mesh, rod, old, stages, seen, span, method, .. } = self;
         seen.copy_from(old);
         for (m, rates) in stages.iter().enumerate() {
-            let (first, last) = (&rates[0], &rates[runge_kutta::STAGES - 1]);
+            let (first, last) = (&rates[0], &rates[method.stages - 1]);
             let grown = |rate: fn(&Rates) -> Vector3<f64>| {
-                let sum = |sum, (j, rates)| sum + rate(rates) * (*span * runge_kutta::weight(j));
-                rates.iter().enumerate().fold(Vector3::zeros(), sum)
+                let sum = |sum, (j, rates)| sum + rate(rates) * (*span * method.weight(j));
+                rates[..method.stages].iter().enumerate().fold(Vector3::zeros(), sum)
             };
             let begin = [Vector3::zeros(), first.theta_t, first.theta_tt];
             let end = [grown(|rates| rates.theta_t), last.theta_t, last.theta_tt];
@@ -482,16 +490,16 @@ impl Stepper {
 
     /// What the stages before stage `i` give of its coordinates, and a guess of it.
     fn prepare_stage(&mut self, i: usize, h: f64, weight: f64, boundary: &Boundary, guess: Guess) {
-        let Self { mesh, old, trial, stages, carried, .. } = self;
+        let Self { mesh, old, trial, stages, carried, method, .. } = self;
         let (on, carried_on) = match guess {
-            Guess::Smooth => (runge_kutta::onward(i, 3), runge_kutta::onward(i, 3)),
-            Guess::Near => (runge_kutta::onward(i, 2), runge_kutta::onward(i, 1)),
+            Guess::Smooth => (method.onward(i, 3), method.onward(i, 3)),
+            Guess::Near => (method.onward(i, 2), method.onward(i, 1)),
         };
         for (m, rates) in stages.iter().enumerate() {
             let memory = &mut old.memory[m];
             let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
             for (j, Rates { theta_t, theta_tt, kappa_t }) in rates[..i].iter().enumerate() {
-                let a = h * runge_kutta::A[i][j];
+                let a = h * method.a[i][j];
                 known.theta += theta_t * a;
                 known.rate += theta_tt * a;
                 known.kappa += kappa_t * a;
@@ -617,15 +625,15 @@ impl Stepper {
 
     /// How far the difference of the step and the embedded one moves a node, over the length.
     fn error(&self, h: f64) -> f64 {
-        let Self { mesh, old, stages, .. } = self;
+        let Self { mesh, old, stages, method, .. } = self;
         let mut way = Vector3::zeros();
         let mut most = 0.0f64;
         let per_cell = mesh.rule.stages;
         for (m, (section, rates)) in old.points.iter().zip(stages).enumerate() {
-            let theta = rates
+            let theta = rates[..method.stages]
                 .iter()
                 .enumerate()
-                .fold(Vector3::zeros(), |sum, (j, rates)| sum + rates.theta_t * (h * runge_kutta::error_weight(j)));
+                .fold(Vector3::zeros(), |sum, (j, rates)| sum + rates.theta_t * (h * method.error_weight(j)));
             let length = mesh.cells[m / per_cell].length * mesh.rule.b[m % per_cell];
             way += section.rotation * theta.cross(&Vector3::z()) * length;
             if m % per_cell == per_cell - 1 {

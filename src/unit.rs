@@ -437,20 +437,25 @@ impl Parameters {
             }
             return Ok((uniform(self.cells as usize), None));
         }
-        // loads bend a rod within (EI/w)^(1/3) of where it is held; measured on a rope of seven such lengths, five cells of
-        // four points are right to 3e-4
+        // loads bend a rod within (EI/w)^(1/3) of where it is held
         let load = rod.mass_per_length * self.gravity.norm()
             + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
         let wound = boundary.tip_moment.norm() * self.length / softest;
         let order = 2.0 * stages as f64;
-        let likely = (0.7 * bends).max(wound).max(2.0) * (1e-3 / tolerance).powf(1.0 / order);
-        let likely = likely.ceil().clamp(1.0, MAX_AUTOMATIC_CELLS);
+        let at_least = |cells: f64| {
+            let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
+            cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
+        };
         if self.extensible || self.step > 0.0 || self.quasi_static {
-            return Ok((uniform(likely.max(turn) as usize), None));
+            // measured on a rope of seven such lengths, five cells of four points are right to 3e-4
+            let cells = at_least(0.7 * bends * (1e-3 / tolerance).powf(1.0 / order));
+            return Ok((uniform(cells.max(turn) as usize), None));
         }
-        let coarsest = uniform((0.5 * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        // equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent
+        let likely = at_least(0.3 * bends * (1e-2 / tolerance).powf(1.8 / order));
+        let coarsest = uniform((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
         let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
         Ok((refiner.start(likely as usize), Some(refiner)))
@@ -511,6 +516,8 @@ impl Parameters {
 const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
 const MAX_AUTOMATIC_CELLS: f64 = 1000.0;
+/// Cells of the coarsest mesh over those: what hangs at rest needs few.
+const AT_REST: f64 = 0.12;
 /// Cells at most, over those that are likely to be needed.
 const ROOM: f64 = 4.0;
 /// The same of a rod that is likely to need few: a base that turns winds it up, whatever its load.

@@ -12,6 +12,7 @@ use cosserat_rod::rate;
 use cosserat_rod::refine::Refiner;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::rosenbrock::{RODAS4, RODAS5P};
+use cosserat_rod::runge_kutta::ESDIRK4;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -199,10 +200,10 @@ fn a_step_of_order_4_allocates_nothing() {
     stepper.start(&boundary).unwrap();
     let count = allocations(|| {
         // one whose factors serve, and one that is lost
-        stepper.attempt(&|_| boundary, 5e-3, 1e-6).unwrap();
+        stepper.attempt(&ESDIRK4, &|_| boundary, 5e-3, 1e-6).unwrap();
         stepper.accept();
         std::hint::black_box(stepper.look(0.3, &boundary));
-        stepper.attempt(&|_| boundary, 10.0, 1e-6).unwrap_err();
+        stepper.attempt(&ESDIRK4, &|_| boundary, 10.0, 1e-6).unwrap_err();
     });
     assert_eq!(count, 0);
 }
@@ -256,12 +257,12 @@ fn a_change_of_cells_allocates_nothing() {
             plane.start(&drive).unwrap();
             for refiner in &mut refiners {
                 for _ in 0..6 {
-                    stepper.attempt(&|_| boundary, 1e-3, 1e-6).unwrap();
+                    stepper.attempt(&ESDIRK4, &|_| boundary, 1e-3, 1e-6).unwrap();
                     stepper.accept();
                     plane.attempt(&|_| drive, 1e-3).unwrap();
                     plane.accept();
-                    refiner.adapt(&mut stepper, &boundary).unwrap();
-                    refiner.adapt_plane(&mut plane, &drive).unwrap();
+                    refiner.adapt(&mut stepper, &boundary, true).unwrap();
+                    refiner.adapt_plane(&mut plane, &drive, true).unwrap();
                 }
             }
             stepper.resume(&mesh, &backup);

@@ -10,6 +10,7 @@ use cosserat_rod::boundary::{Boundary, Support};
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::pose::{Row, Section, State};
 use cosserat_rod::rod::Rod;
+use cosserat_rod::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
@@ -96,7 +97,7 @@ const DURATION: f64 = 0.6;
 #[derive(Clone, Copy, Debug)]
 enum Method {
     Alpha(Scheme),
-    RungeKutta,
+    RungeKutta(&'static RungeKutta),
 }
 
 fn run(scene: Scene, method: Method, steps: usize, mesh: Mesh, samples: usize, modulus: f64) -> Record {
@@ -118,8 +119,8 @@ fn run(scene: Scene, method: Method, steps: usize, mesh: Mesh, samples: usize, m
                 assert!(report.iterations <= 7, "{scene:?}: {report:?}");
                 assert_eq!(stepper.state.row, Row::Rotations, "{scene:?}: a step at {t} did not resolve the motion");
             }
-            Method::RungeKutta => {
-                let step = stepper.attempt(&|since| scene.boundary(begin + since), h, 1e-10).unwrap();
+            Method::RungeKutta(method) => {
+                let step = stepper.attempt(method, &|since| scene.boundary(begin + since), h, 1e-10).unwrap();
                 // five stages
                 assert!(step.iterations <= 25, "{scene:?}: {step:?}");
                 stepper.accept();
@@ -223,9 +224,19 @@ fn fourth_order_in_time_of_the_runge_kutta_steps() {
         (Scene::Swing, (2, 2), 3.95),
         (Scene::Swing, (1, 4), 3.95),
     ] {
-        let orders = orders_in_time_on(mesh, scene, Method::RungeKutta, &[120, 180, 240, 360]);
+        let orders = orders_in_time_on(mesh, scene, Method::RungeKutta(&ESDIRK4), &[120, 180, 240, 360]);
         for (order, quantity) in orders.iter().zip(QUANTITIES) {
             assert!(*order > least, "{scene:?} on {mesh:?}, {quantity}: {order:.2}");
+        }
+    }
+}
+
+#[test]
+fn second_order_in_time_of_the_short_ones() {
+    for scene in [Scene::Swing, Scene::Pulse, Scene::Spin] {
+        let orders = orders_in_time_on((2, 2), scene, Method::RungeKutta(&TR_BDF2), &[240, 360, 480, 720]);
+        for (order, quantity) in orders.iter().zip(QUANTITIES) {
+            assert!((order - 2.0).abs() < 0.15, "{scene:?}, {quantity}: {order:.2}");
         }
     }
 }
@@ -242,7 +253,7 @@ fn look(rod: Rod, steps: usize, parts: usize) -> (Record, [f64; 4]) {
     let (mut record, mut missed) = (Record::new(), [0.0f64; 4]);
     for i in 0..steps {
         let begin = i as f64 * h;
-        stepper.attempt(&|since| scene.boundary(begin + since), h, 1e-10).unwrap();
+        stepper.attempt(&ESDIRK4, &|since| scene.boundary(begin + since), h, 1e-10).unwrap();
         stepper.accept();
         let end = stepper.state.clone();
         for part in 1..=parts {
@@ -269,7 +280,7 @@ fn runge_kutta_steps_are_known_in_between() {
     let counts = [120, 180, 240, 360];
     let mesh = || Mesh::uniform(1.0, 4, 4, Vec3::zeros());
     let errors = counts.map(|steps| {
-        let exact = run(Scene::Pulse, Method::RungeKutta, 8 * steps, mesh(), 8 * steps, 5e6);
+        let exact = run(Scene::Pulse, Method::RungeKutta(&ESDIRK4), 8 * steps, mesh(), 8 * steps, 5e6);
         distance(&look(rod(), steps, 8).0, &exact)
     });
     // what is integrated twice is as good as the ends; accelerations are a difference of the ends over h²

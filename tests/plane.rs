@@ -11,6 +11,7 @@ use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::State;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::rosenbrock::{RODAS4, RODAS5P, Rosenbrock};
+use cosserat_rod::runge_kutta::ESDIRK4;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
@@ -186,7 +187,7 @@ fn the_spatial_rod_of_the_same_mesh_goes_where_the_plane_one_goes() {
         let dt = duration / steps as f64;
         for i in 0..steps {
             let begin = i as f64 * dt;
-            stepper.attempt(&|since| boundary(begin + since), dt, 1e-13).unwrap();
+            stepper.attempt(&ESDIRK4, &|since| boundary(begin + since), dt, 1e-13).unwrap();
             stepper.accept();
         }
         let state = &stepper.state;

@@ -12,6 +12,7 @@ use cosserat_rod::pose::State;
 use cosserat_rod::refine::Refiner;
 use cosserat_rod::rod::Rod;
 use cosserat_rod::rosenbrock::RODAS4;
+use cosserat_rod::runge_kutta::ESDIRK4;
 use cosserat_rod::so3;
 use cosserat_rod::stepper::Stepper;
 use nalgebra::{Matrix3, Vector3};
@@ -78,7 +79,7 @@ fn after_the_pulse(mesh: &Mesh, rod: &Rod, duration: f64) -> Stepper {
     let mut stepper = Stepper::new(mesh.clone(), rod.clone(), state);
     stepper.start(&struck(0.0)).unwrap();
     for i in 0..(duration / 1e-3).round() as usize {
-        stepper.attempt(&|t| struck(i as f64 * 1e-3 + t), 1e-3, 1e-9).unwrap();
+        stepper.attempt(&ESDIRK4, &|t| struck(i as f64 * 1e-3 + t), 1e-3, 1e-9).unwrap();
         stepper.accept();
     }
     stepper
@@ -115,7 +116,7 @@ fn the_estimate_is_of_the_size_of_the_error() {
         for pair in tips.windows(2) {
             let h = (pair[1].0 - pair[0].0) / 4.0;
             for i in 0..4 {
-                stepper.attempt(&|t| struck(pair[0].0 + i as f64 * h + t), h, 1e-7).unwrap();
+                stepper.attempt(&ESDIRK4, &|t| struck(pair[0].0 + i as f64 * h + t), h, 1e-7).unwrap();
                 stepper.accept();
             }
             errors.push((stepper.state.tip().position - pair[1].1).norm());
@@ -171,7 +172,7 @@ fn a_change_of_cells_moves_no_more_than_they_leave_open() {
                 || of_plane(&halved.borrow()),
                 |tolerance| {
                     let plane = &mut *halved.borrow_mut();
-                    assert!(Refiner::new(&mesh, tolerance, 64).adapt_plane(plane, &drive).unwrap());
+                    assert!(Refiner::new(&mesh, tolerance, 64).adapt_plane(plane, &drive, true).unwrap());
                     of_plane(plane)
                 },
             ));
@@ -190,7 +191,7 @@ fn a_change_of_cells_moves_no_more_than_they_leave_open() {
             || of_space(&stepper.borrow()),
             |tolerance| {
                 let stepper = &mut *stepper.borrow_mut();
-                assert!(Refiner::new(&mesh, tolerance, 64).adapt(stepper, &boundary).unwrap());
+                assert!(Refiner::new(&mesh, tolerance, 64).adapt(stepper, &boundary, true).unwrap());
                 of_space(stepper)
             },
         );
@@ -223,7 +224,7 @@ fn fall(tolerance: f64) -> (f64, usize, usize) {
             }
             plane.accept();
             left = if parts == 1.0 { 0.0 } else { left - h };
-            changes += usize::from(refiner.adapt_plane(&mut plane, &drive).unwrap());
+            changes += usize::from(refiner.adapt_plane(&mut plane, &drive, true).unwrap());
             cells = cells.max(plane.mesh().cells.len());
         }
         plane.look(1.0, &drive);
@@ -248,9 +249,9 @@ fn a_rod_struck_after_a_rest_changes_its_cells_in_time() {
     let mut refiner = Refiner::new(&coarsest, 1e-3, 32);
     let mut stepper = after_the_pulse(&refiner.start(8), &soft(), 0.0);
     for _ in 0..20 {
-        stepper.attempt(&|_| struck(0.0), 5e-3, 1e-6).unwrap();
+        stepper.attempt(&ESDIRK4, &|_| struck(0.0), 5e-3, 1e-6).unwrap();
         stepper.accept();
-        refiner.adapt(&mut stepper, &struck(0.0)).unwrap();
+        refiner.adapt(&mut stepper, &struck(0.0), true).unwrap();
     }
     assert_eq!(stepper.mesh, coarsest);
     let (mut errors, mut changes) = (Vec::new(), 0);
@@ -258,9 +259,9 @@ fn a_rod_struck_after_a_rest_changes_its_cells_in_time() {
         let h = (pair[1].0 - pair[0].0) / 2.0;
         for i in 0..2 {
             let begin = pair[0].0 + i as f64 * h;
-            stepper.attempt(&|t| struck(begin + t), h, 1e-6).unwrap();
+            stepper.attempt(&ESDIRK4, &|t| struck(begin + t), h, 1e-6).unwrap();
             stepper.accept();
-            changes += usize::from(refiner.adapt(&mut stepper, &struck(begin + h)).unwrap());
+            changes += usize::from(refiner.adapt(&mut stepper, &struck(begin + h), true).unwrap());
         }
         errors.push((stepper.state.tip().position - pair[1].1).norm());
     }
@@ -303,7 +304,7 @@ fn cells_of_a_wound_rod_stay_short() {
     let mesh = refiner.start(8);
     let mut stepper = after_the_pulse(&mesh, &soft(), 0.0);
     // of 2.5 rad together
-    assert!(!refiner.adapt(&mut stepper, &struck(0.0)).unwrap());
+    assert!(!refiner.adapt(&mut stepper, &struck(0.0), true).unwrap());
     assert_eq!(stepper.mesh, mesh);
 }
 
@@ -318,7 +319,7 @@ fn rods_that_shear_or_are_held_keep_their_cells() {
         let mut stepper = Stepper::new(mesh.clone(), rod, state);
         let mut refiner = Refiner::new(&mesh, 0.0, 16);
         refiner.equilibrium(&mut stepper, &boundary).unwrap();
-        assert!(!refiner.adapt(&mut stepper, &boundary).unwrap());
+        assert!(!refiner.adapt(&mut stepper, &boundary, true).unwrap());
         assert_eq!(stepper.mesh, mesh);
     }
 }
@@ -333,9 +334,9 @@ fn a_rod_on_other_cells_is_resumed_to_the_last_bit() {
     let run = |stepper: &mut Stepper, refiner: &mut Refiner| {
         for i in 0..8 {
             let time = 0.1 + i as f64 * 2e-3;
-            stepper.attempt(&|t| struck(time + t), 2e-3, 1e-6).unwrap();
+            stepper.attempt(&ESDIRK4, &|t| struck(time + t), 2e-3, 1e-6).unwrap();
             stepper.accept();
-            refiner.adapt(stepper, &struck(time + 2e-3)).unwrap();
+            refiner.adapt(stepper, &struck(time + 2e-3), true).unwrap();
         }
         (stepper.mesh.clone(), stepper.state.clone())
     };

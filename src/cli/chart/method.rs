@@ -7,6 +7,7 @@ use cosserat_rod::mesh::Mesh;
 use cosserat_rod::plane::Plane;
 use cosserat_rod::pose::State;
 use cosserat_rod::rosenbrock::{RODAS4, RODAS5P, Rosenbrock};
+use cosserat_rod::runge_kutta::ESDIRK4;
 use cosserat_rod::stepper::Stepper;
 use cosserat_rod::unit::Parameters;
 use cpu_time::ProcessTime;
@@ -291,7 +292,7 @@ fn generalised_alpha(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) 
 
 /// A Runge-Kutta step of the pose formulation, from `time` on.
 fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Result<(), Box<dyn Error>> {
-    stepper.attempt(&|since| scene.boundary(time + since), step, STAGE_ACCURACY)?;
+    stepper.attempt(&ESDIRK4, &|since| scene.boundary(time + since), step, STAGE_ACCURACY)?;
     stepper.accept();
     Ok(())
 }
