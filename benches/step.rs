@@ -1,4 +1,5 @@
-//! Work and time of one Newton iteration and of whole steps, per cell: `cargo bench --bench step`.
+//! Work and time of one Newton iteration and of whole steps, per cell: `cargo bench --bench step`, or some of its tables:
+//! `cargo bench --bench step -- steps rods`.
 //!
 //! Instructions are counted by callgrind, if it is installed: the program runs itself under it and takes the difference
 //! of two runs, so that what is counted is one iteration and nothing else. Times are medians. The rod is of rubber,
@@ -161,6 +162,11 @@ fn median(mut samples: Vec<f64>) -> f64 {
 /// Instructions of this program under callgrind with so many iterations.
 fn counted(cells: usize, stages: usize, iterations: usize, part: &str, of: &str) -> Option<f64> {
     let output = Command::new("valgrind")
+        // long copies and fills in vectors like short ones: a string instruction counts once for every byte
+        .env(
+            "GLIBC_TUNABLES",
+            "glibc.cpu.x86_rep_movsb_threshold=0x40000000:glibc.cpu.x86_rep_stosb_threshold=0x40000000",
+        )
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(std::env::current_exe().ok()?)
         .arg("--count")
@@ -251,12 +257,13 @@ impl Whole {
     }
 }
 
-/// Whole steps: instructions and time over the number of cells.
+/// Whole steps: instructions and time over the number of cells, and over that of sections, of which the ends have one more
+/// than the cells.
 fn whole_steps() {
     for (of, what) in [("steps-in-space", "in space, order 4"), ("steps-in-a-plane", "in a plane, RODAS4")] {
-        println!("\nOne step {what}, {WHOLE_STAGES} Gauss points in a cell");
-        let names = ["instructions", "further cell", "ns per cell", "iterations"].map(|name| format!("{name:>14}"));
-        println!("{:>6}{}", "cells", names.concat());
+        println!("\nOne step {what}, {WHOLE_STAGES} Gauss points in a cell: instructions and time");
+        let names = ["per cell", "further cell", "per section", "ns per cell", "iterations"];
+        println!("{:>6}{}", "cells", names.map(|name| format!("{name:>14}")).concat());
         let mut before: Option<(usize, f64)> = None;
         for cells in CELLS {
             let mut whole = Whole::new(of, cells);
@@ -265,15 +272,23 @@ fn whole_steps() {
             let work = instructions(cells, WHOLE_STAGES, "step", of);
             let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
             before = work.map(|work| (cells, work));
-            let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.0}"));
-            let work = show(work.map(|work| work / cells as f64));
-            println!("{cells:>6}{work:>14}{:>14}{:>14.0}{iterations:>14}", show(further), time * 1e9);
+            let per = |count: usize| work.map(|work| work / count as f64);
+            let sections = cells * (WHOLE_STAGES + 1) + 1;
+            let show = |value: Option<f64>| value.map_or(format!("{:>14}", "-"), |value| format!("{value:>14.0}"));
+            let counts = [per(cells), further, per(sections)].map(show).concat();
+            println!("{cells:>6}{counts}{:>14.0}{iterations:>14}", time * 1e9);
         }
     }
 }
 
 /// A second of two long rods in the steps that the unit chooses: the umbilical in waves, a helix of 50 turns released.
-fn long_rods() -> Result<(), cosserat_rod::unit::Error> {
+fn long_rods() {
+    if let Err(error) = try_long_rods() {
+        println!("\nThe long rods were lost: {error}");
+    }
+}
+
+fn try_long_rods() -> Result<(), cosserat_rod::unit::Error> {
     println!("\nA second of a long rod, left to the unit in communication steps of 20 ms, stages as in the line");
     println!(
         "{:>10} {:>6} {:>7} {:>6} {:>8} {:>10} {:>22}",
@@ -371,6 +386,90 @@ fn interface() -> Result<[f64; 3], Box<dyn std::error::Error>> {
     Ok(results.map(median))
 }
 
+/// One Newton iteration: its work and its time, over the number of cells.
+fn iterations() {
+    for stages in STAGES {
+        println!(
+            "\nOne Newton iteration with {stages} Gauss point(s) in a cell: instructions per cell, those of a further cell"
+        );
+        println!(
+            "(the difference to the line above: without what the ends of the rod cost), time per cell and its shares"
+        );
+        let phases = PHASES.map(|phase| format!("{phase:>14}")).concat();
+        println!("{:>6} {:>14} {:>14} {:>9}{phases}", "cells", "instructions", "further cell", "ns");
+        let mut before: Option<(usize, f64)> = None;
+        for cells in CELLS {
+            let mut iteration = Iteration::new(cells, stages);
+            PHASES.iter().for_each(|phase| iteration.run(phase));
+            let times = PHASES.map(|phase| iteration.seconds(phase, cells) / cells as f64);
+            let total: f64 = times.iter().sum();
+            let shares = times.map(|time| format!("{:>12.0} %", 100.0 * time / total)).concat();
+
+            let work = instructions(cells, stages, "all", "rod");
+            let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1}"));
+            let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
+            before = work.map(|work| (cells, work));
+            let per_cell = show(work.map(|work| work / cells as f64));
+            println!("{cells:>6} {per_cell:>14} {:>14} {:>9.0}{shares}", show(further), total * 1e9);
+        }
+    }
+}
+
+/// The work of the parts of an iteration, over the stages of a cell.
+fn parts() {
+    println!("\nInstructions of a further cell");
+    println!("{:>20} {:>8} {:>8} {:>8} {:>8}", "stages", 1, 2, 3, 4);
+    for (of, part) in [
+        ("rod", "assembly"),
+        ("space", "factors"),
+        ("space", "solution"),
+        ("extensible", "factors"),
+        ("extensible", "solution"),
+        ("plane", "factors"),
+        ("plane", "solution"),
+    ] {
+        let count = |stages| of_further_cell(stages, part, of).map_or("-".to_string(), |count| format!("{count:.0}"));
+        let counts = [1, 2, 3, 4].map(|stages| format!(" {:>8}", count(stages))).concat();
+        println!("{of:>11} {part:>8}{counts}");
+    }
+}
+
+/// The sweep beside a general solver.
+fn solvers() {
+    println!("\nSweep and banded LU with partial pivoting on the same systems, µs");
+    println!("{:>6} {:>7} {:>10} {:>10} {:>7}", "stages", "cells", "sweep", "LU", "ratio");
+    for stages in STAGES {
+        for cells in [10, 100, 400] {
+            let mut iteration = Iteration::new(cells, stages);
+            PHASES.iter().for_each(|phase| iteration.run(phase));
+            let (sweep, lu) = sweep_and_lu(&mut iteration, cells);
+            println!("{stages:>6} {cells:>7} {:>10.1} {:>10.1} {:>7.1}", sweep * 1e6, lu * 1e6, lu / sweep);
+        }
+    }
+}
+
+/// What the C interface adds.
+fn interfaces() {
+    match interface() {
+        Ok([library, bare, whole]) => {
+            println!("\nA communication step of one box cell at rest, µs");
+            println!("library {:.2}, fmi2DoStep {:.2} (+{:.2})", library * 1e6, bare * 1e6, (bare - library) * 1e6);
+            println!("set 19 inputs, fmi2DoStep, get 25 outputs {:.2} (+{:.2})", whole * 1e6, (whole - library) * 1e6);
+        }
+        Err(error) => println!("\nThe C interface was not measured: {error}"),
+    }
+}
+
+/// The tables, by name.
+const TABLES: [(&str, fn()); 6] = [
+    ("iterations", iterations),
+    ("steps", whole_steps),
+    ("rods", long_rods),
+    ("parts", parts),
+    ("solvers", solvers),
+    ("interface", interfaces),
+];
+
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     if let Some(at) = arguments.iter().position(|argument| argument == "--count") {
@@ -400,70 +499,15 @@ fn main() {
         return;
     }
 
-    for stages in STAGES {
-        println!(
-            "\nOne Newton iteration with {stages} Gauss point(s) in a cell: instructions per cell, those of a further cell"
-        );
-        println!(
-            "(the difference to the line above: without what the ends of the rod cost), time per cell and its shares"
-        );
-        let phases = PHASES.map(|phase| format!("{phase:>14}")).concat();
-        println!("{:>6} {:>14} {:>14} {:>9}{phases}", "cells", "instructions", "further cell", "ns");
-        let mut before: Option<(usize, f64)> = None;
-        for cells in CELLS {
-            let mut iteration = Iteration::new(cells, stages);
-            PHASES.iter().for_each(|phase| iteration.run(phase));
-            let times = PHASES.map(|phase| iteration.seconds(phase, cells) / cells as f64);
-            let total: f64 = times.iter().sum();
-            let shares = times.map(|time| format!("{:>12.0} %", 100.0 * time / total)).concat();
-
-            let work = instructions(cells, stages, "all", "rod");
-            let show = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1}"));
-            let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
-            before = work.map(|work| (cells, work));
-            let per_cell = show(work.map(|work| work / cells as f64));
-            println!("{cells:>6} {per_cell:>14} {:>14} {:>9.0}{shares}", show(further), total * 1e9);
+    // cargo itself adds `--bench`
+    let named: Vec<&str> =
+        arguments[1..].iter().map(String::as_str).filter(|argument| !argument.starts_with("--")).collect();
+    for name in named.iter().filter(|name| TABLES.iter().all(|(table, _)| table != *name)) {
+        eprintln!("no table {name}; there are {}", TABLES.map(|(table, _)| table).join(", "));
+    }
+    for (name, table) in TABLES {
+        if named.is_empty() || named.contains(&name) {
+            table();
         }
-    }
-
-    whole_steps();
-    if let Err(error) = long_rods() {
-        println!("\nThe long rods were lost: {error}");
-    }
-
-    println!("\nInstructions of a further cell");
-    println!("{:>20} {:>8} {:>8} {:>8} {:>8}", "stages", 1, 2, 3, 4);
-    for (of, part) in [
-        ("rod", "assembly"),
-        ("space", "factors"),
-        ("space", "solution"),
-        ("extensible", "factors"),
-        ("extensible", "solution"),
-        ("plane", "factors"),
-        ("plane", "solution"),
-    ] {
-        let count = |stages| of_further_cell(stages, part, of).map_or("-".to_string(), |count| format!("{count:.0}"));
-        let counts = [1, 2, 3, 4].map(|stages| format!(" {:>8}", count(stages))).concat();
-        println!("{of:>11} {part:>8}{counts}");
-    }
-
-    println!("\nSweep and banded LU with partial pivoting on the same systems, µs");
-    println!("{:>6} {:>7} {:>10} {:>10} {:>7}", "stages", "cells", "sweep", "LU", "ratio");
-    for stages in STAGES {
-        for cells in [10, 100, 400] {
-            let mut iteration = Iteration::new(cells, stages);
-            PHASES.iter().for_each(|phase| iteration.run(phase));
-            let (sweep, lu) = sweep_and_lu(&mut iteration, cells);
-            println!("{stages:>6} {cells:>7} {:>10.1} {:>10.1} {:>7.1}", sweep * 1e6, lu * 1e6, lu / sweep);
-        }
-    }
-
-    match interface() {
-        Ok([library, bare, whole]) => {
-            println!("\nA communication step of one box cell at rest, µs");
-            println!("library {:.2}, fmi2DoStep {:.2} (+{:.2})", library * 1e6, bare * 1e6, (bare - library) * 1e6);
-            println!("set 19 inputs, fmi2DoStep, get 25 outputs {:.2} (+{:.2})", whole * 1e6, (whole - library) * 1e6);
-        }
-        Err(error) => println!("\nThe C interface was not measured: {error}"),
     }
 }
