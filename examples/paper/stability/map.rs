@@ -1,7 +1,7 @@
 //! The map: a panel for every method and scheme, in it the materials and meshes over the time step.
 
 use super::scan::{MATERIALS, Outcome, Verdict};
-use super::{CELLS, Case, Method, SCHEMES, TIME_STEPS};
+use super::{CELLS, Case, Method, TIME_STEPS};
 use crate::draw::{Area, Fallible, GREY, INK, Picture, px, text};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -10,10 +10,11 @@ use std::error::Error;
 /// On the page: a square of the map, its panels and what stands left of them.
 const SQUARE: (f64, f64) = (13.0, 6.0);
 const PANEL: (f64, f64) = (SQUARE.0 * TIME_STEPS.len() as f64, SQUARE.1 * (MATERIALS.len() * CELLS.len()) as f64);
-const GAP: (f64, f64) = (14.0, 12.0);
+const GAP: (f64, f64) = (14.0, 8.0);
 const LEFT: f64 = 190.0;
-const TOP: f64 = 24.0;
-const WIDTH: u32 = 1420;
+/// Of what stands above a panel.
+const HEAD: f64 = 24.0;
+const WIDTH: u32 = 1250;
 
 /// Errors from the first to the second shade of what is fine, as powers of ten.
 const SHADES: (f64, f64) = (-4.0, -0.5);
@@ -46,12 +47,17 @@ pub fn draw(
     let title = "Stability: a rod released from the horizontal, 200 steps of every size";
     let subtitle = "each panel: steps from 1e-8 to 100 s; from above hair, rubber, steel, each of 6, 25 and 100 cells";
     Picture::new(WIDTH, title, subtitle, |area| {
-        for (column, (name, _)) in SCHEMES.iter().enumerate() {
-            let x = LEFT + column as f64 * (PANEL.0 + GAP.0) + 0.5 * PANEL.0;
-            text(area, name, (x, TOP - 12.0), 15.0, INK, HPos::Center)?;
-        }
+        let (mut y, mut above) = (0.0, Vec::new());
         for (row, method) in Method::ALL.into_iter().enumerate() {
-            let y = TOP + row as f64 * (PANEL.1 + GAP.1);
+            let heads = method.heads();
+            if heads != above {
+                y += HEAD;
+                for (column, name) in heads.iter().enumerate() {
+                    let x = LEFT + column as f64 * (PANEL.0 + GAP.0) + 0.5 * PANEL.0;
+                    text(area, name, (x, y - 12.0), 15.0, INK, HPos::Center)?;
+                }
+            }
+            above = heads;
             for (k, words) in method.name().split(", ").enumerate() {
                 let size = if k == 0 { 16.0 } else { 14.0 };
                 let color = if k == 0 { INK } else { GREY };
@@ -84,18 +90,16 @@ pub fn draw(
                     let ends = [(px(x), px(line)), (px(x + PANEL.0), px(line))];
                     area.draw(&PathElement::new(ends, WHITE.stroke_width(px(2.0) as u32)))?;
                 }
+                if Method::ALL[row + 1..].iter().all(|below| !below.schemes().contains(&column)) {
+                    for (dt, label) in [(1e-8, "1e−8"), (1e-5, "1e−5"), (1e-2, "0.01"), (10.0, "10 s")] {
+                        let at = (x + SQUARE.0 * place(dt), y + PANEL.1 + 8.0);
+                        text(area, label, at, 12.0, GREY, HPos::Center)?;
+                    }
+                }
             }
+            y += PANEL.1 + GAP.1;
         }
-        let rows = Method::ALL.len() as f64;
-        let bottom = TOP + rows * (PANEL.1 + GAP.1);
-        for column in 0..SCHEMES.len() {
-            let x = LEFT + column as f64 * (PANEL.0 + GAP.0);
-            for (dt, label) in [(1e-8, "1e−8"), (1e-5, "1e−5"), (1e-2, "0.01"), (10.0, "10 s")] {
-                let at = x + SQUARE.0 * (place(dt) - 0.5);
-                text(area, label, (at, bottom - 4.0), 12.0, GREY, HPos::Center)?;
-            }
-        }
-        legend(area, bottom + 26.0)
+        legend(area, y + 26.0)
     })
 }
 
@@ -109,18 +113,18 @@ fn place(dt: f64) -> f64 {
 fn legend(area: &Area<'_>, y: f64) -> Fallible {
     let mut x = LEFT;
     text(area, "fine, error of the tip / length:", (x, y), 14.0, INK, HPos::Left)?;
-    x += 236.0;
+    x += 180.0;
     for error in [1e-4, 1e-3, 1e-2, 1e-1, 0.3] {
         rectangle(area, (x, y - 8.0), (24.0, 16.0), shade(error).filled())?;
         let label = if error < 0.1 { format!("{error:.0e}").replace('-', "−") } else { format!("{error}") };
         text(area, &label, (x + 30.0, y), 13.0, GREY, HPos::Left)?;
-        x += 76.0;
+        x += 66.0;
     }
     x += 10.0;
     for verdict in [Verdict::Ringing, Verdict::Drifted, Verdict::Growing, Verdict::Lost] {
         rectangle(area, (x, y - 8.0), (24.0, 16.0), color(verdict, 0.0).filled())?;
         text(area, verdict.name(), (x + 30.0, y), 14.0, INK, HPos::Left)?;
-        x += 154.0;
+        x += 144.0;
     }
     Ok(())
 }

@@ -26,6 +26,8 @@ const NODE_CORRECTIONS: usize = 12;
 /// What the tip may miss, and the correction of a node, both relative.
 const TOLERANCE: f64 = 1e-8;
 const NODE_TOLERANCE: f64 = 1e-13;
+/// Correction of a node, relative, below which one that does not halve the one before is rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// ln of the growth from which Newton on the guess is lost.
 const LARGEST_EXPONENT: f64 = 12.0;
@@ -101,6 +103,7 @@ impl Shooting {
                 step.update_slope(before, after, ds);
             };
             follow(after);
+            let mut last = f64::INFINITY;
             for correction in 1.. {
                 let near = [&rest[j], &rest[j + 1]];
                 let mut missing = SVector::<f64, 15>::zeros();
@@ -121,7 +124,9 @@ impl Shooting {
                 if !largest.is_finite() {
                     return None;
                 }
-                if largest < NODE_TOLERANCE || correction == NODE_CORRECTIONS {
+                let rounding = largest < ROUNDING && largest > 0.5 * last;
+                last = largest;
+                if largest < NODE_TOLERANCE || rounding || correction == NODE_CORRECTIONS {
                     sensitivity = -(inverse * blocks.before * sensitivity);
                     break;
                 }
