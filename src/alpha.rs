@@ -21,6 +21,7 @@
 //! [`Scheme::rebased`]); otherwise the acceleration of whatever is too stiff to follow its own dynamics, and with it
 //! the reaction, begins every such step with an error O(Δt) that decays slowly, and never at ρ∞ = 1.
 
+use crate::archive::archived;
 use nalgebra::Vector3;
 
 /// The three weights (α, β, γ).
@@ -53,6 +54,10 @@ pub struct Motion {
     /// ȧ, first-order accurate.
     pub jerk: Vector3<f64>,
 }
+
+archived!(Scheme { alpha, beta, gamma });
+archived!(Rate { auxiliary, value });
+archived!(Motion { velocity, acceleration, jerk });
 
 impl Scheme {
     /// Implicit Euler: first order, no memory in the auxiliary rates.

@@ -1,5 +1,6 @@
 //! What happens at the two ends of a rod, and what acts on it. Both formulations read it.
 
+use crate::archive::archived;
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
@@ -15,6 +16,8 @@ pub struct Held {
     /// section.
     pub rotation: [bool; 3],
 }
+
+archived!(Held { translation, rotation });
 
 impl Held {
     /// All six: a clamp.
@@ -41,6 +44,8 @@ pub struct Support {
     /// What it holds.
     pub held: Held,
 }
+
+archived!(Support { position, rotation, velocity, angular_velocity, acceleration, held });
 
 impl Support {
     /// A clamp at rest.
@@ -98,6 +103,10 @@ pub struct Drive {
     /// From this instant on.
     pub rates: Rates,
 }
+
+archived!(Boundary { base, tip, tip_force, tip_moment, gravity });
+archived!(Rates { jerk, angular_acceleration, tip_force, tip_moment });
+archived!(Drive { boundary, rates });
 
 impl Boundary {
     /// A base, a free tip without loads.

@@ -1,5 +1,6 @@
 //! Energies of a state, and the works and losses of a step; all by the Gauss rule of the cells.
 
+use crate::archive::archived;
 use crate::boundary::Boundary;
 use crate::mesh::Mesh;
 use crate::pose::State;
@@ -24,6 +25,8 @@ pub struct Energy {
     /// Work the tip force and moment, and the support of the tip, have done on the rod.
     pub work_tip: f64,
 }
+
+archived!(Energy { kinetic, elastic, gravity, dissipated, work_base, work_tip });
 
 impl Energy {
     /// Energies of a state at the start, where no work has been done.

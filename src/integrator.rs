@@ -12,6 +12,7 @@
 //! before the interval.
 
 use crate::alpha::Scheme;
+use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive};
 use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
@@ -165,6 +166,11 @@ struct Pace {
     shortest: f64,
 }
 
+// how far it may go is settled at the start
+// what simple steps are allowed is set at every one
+archived!(Pace { next } but { allowed, order, shortest });
+archived!(Effort { steps, iterations, retries, order, step, planar, error, space_error });
+
 impl Pace {
     /// The length of the next step of an interval of which `rest` s are left, and whether it is the last one.
     fn step(&self, rest: f64) -> (f64, bool) {
@@ -269,7 +275,7 @@ pub struct Integrator {
     simple: Pace,
     /// What gravity and bending can give the rod, J.
     large: f64,
-    /// Kinetic energy up to which it rests, J: cells that are joined then bring nothing but waves.
+    /// Kinetic energy up to which it rests, over the large one: cells that are joined then bring nothing but waves.
     rest: f64,
     /// Error in a second that goes with the tolerance, over the length.
     drift: f64,
@@ -296,10 +302,22 @@ impl Integrator {
         step: f64,
         boundary: &Boundary,
     ) -> Result<Self, Diverged> {
-        let way = if stepper.rod.is_extensible() && way != Way::Static { Way::Equal } else { way };
         if way != Way::Static {
             stepper.start(boundary)?;
         }
+        Ok(Self::room(stepper, refiner, way, scheme, step, boundary))
+    }
+
+    /// The same with accelerations of zero: room for what is to be loaded.
+    pub fn room(
+        mut stepper: Stepper,
+        refiner: Option<Refiner>,
+        way: Way,
+        scheme: Scheme,
+        step: f64,
+        boundary: &Boundary,
+    ) -> Self {
+        let way = if stepper.rod.is_extensible() && way != Way::Static { Way::Equal } else { way };
         let (tolerance, time, planar) = match way {
             Way::Accurate { tolerance, time, planar } => (tolerance, time, planar),
             Way::Equal | Way::Static => (0.0, 0.0, false),
@@ -341,7 +359,7 @@ impl Integrator {
         let length = stepper.mesh.length();
         let weight = stepper.rod.mass_per_length * length * boundary.gravity.norm();
         let large = weight * length + stepper.rod.stiffness.max() / length;
-        Ok(Self {
+        Self {
             in_plane: false,
             planar,
             way,
@@ -351,7 +369,7 @@ impl Integrator {
             pace,
             simple,
             large,
-            rest: AT_REST * tolerance * tolerance * large,
+            rest: AT_REST * tolerance * tolerance,
             drift: SHARE_IN_TIME * tolerance / time,
             energy,
             effort,
@@ -362,7 +380,7 @@ impl Integrator {
                 (refiner, kept)
             }),
             stepper,
-        })
+        }
     }
 
     /// Advances over an interval of `duration` s under `drive`.
@@ -487,9 +505,7 @@ impl Integrator {
         let Some(planar) = &mut self.planar else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
-        if !planar.plane.is_seen() {
-            planar.plane.look(1.0, &begin);
-        }
+        planar.plane.look(1.0, &begin);
         // what pulls the rod may be other than before
         self.energy = self.energy.now(&planar.plane.energy());
         let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
@@ -546,7 +562,9 @@ impl Integrator {
             self.effort.planar = true;
             let due = watched && planar.is_due(dt);
             if let Some((refiner, _)) = &mut self.refiners {
-                if refiner.adapt_plane(&mut planar.plane, &at(dt), self.energy.kinetic > self.rest) == Ok(true) {
+                if refiner.adapt_plane(&mut planar.plane, &at(dt), self.energy.kinetic > self.rest * self.large)
+                    == Ok(true)
+                {
                     planar.disturbance.go_on(&planar.plane);
                     self.energy = self.energy.now(&planar.plane.energy());
                 }
@@ -604,7 +622,8 @@ impl Integrator {
             let now = drive(time).boundary;
             if let Some((refiner, _)) = &mut self.refiners {
                 // cells that cannot be started stay as they were
-                let changed = refiner.adapt(&mut self.stepper, &now, self.energy.kinetic > self.rest) == Ok(true);
+                let changed =
+                    refiner.adapt(&mut self.stepper, &now, self.energy.kinetic > self.rest * self.large) == Ok(true);
                 self.effort.space_error = self.effort.space_error.max(refiner.estimated());
                 if changed {
                     self.see_energy(&now.gravity);
@@ -810,7 +829,7 @@ impl Integrator {
 
     /// Arc length of the rod, m.
     pub fn length(&self) -> f64 {
-        self.stepper.mesh.length()
+        self.plane().map_or(&self.stepper.mesh, Plane::mesh).length()
     }
 
     /// The rod in space at present, wherever it is.
@@ -827,6 +846,44 @@ impl Integrator {
 fn gain(before: &Energy, after: &Energy, work: &Powers, large: f64) -> f64 {
     let gained = after.total() - before.total() + work.lost - work.base - work.tip;
     gained / (large + after.kinetic + after.elastic)
+}
+
+/// What is kept before an interval, so that a step that fails is undone, decides all that follows: that is stored, for a
+/// rod that was started alike to go on from.
+impl Archived for Integrator {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        self.keep();
+        let Self { planar, large, before, state_before, mesh_before, refiners, .. } = self;
+        let Before { in_plane, pace, simple, energy, effort } = before;
+        in_plane.visit(archive)?;
+        pace.visit(archive)?;
+        simple.visit(archive)?;
+        energy.visit(archive)?;
+        effort.visit(archive)?;
+        // of a length summed up over the cells of the start
+        large.visit(archive)?;
+        if let Some(Planar { before: (pace, disturbance, unwatched), .. }) = planar {
+            pace.visit(archive)?;
+            disturbance.visit(archive)?;
+            unwatched.visit(archive)?;
+        }
+        match planar {
+            Some(Planar { kept, .. }) if *in_plane => kept.visit(archive)?,
+            _ => {
+                let Mesh { cells, rule } = mesh_before;
+                cells.visit(archive)?;
+                state_before.resize(cells.len(), rule.stages);
+                state_before.visit(archive)?;
+            }
+        }
+        if let Some((_, before)) = refiners {
+            before.visit(archive)?;
+        }
+        if archive.is_loading() {
+            self.restore();
+        }
+        Ok(())
+    }
 }
 
 /// Makes the rod in a plane that of `stepper`.

@@ -22,6 +22,7 @@
 //! x = (w, φ), finds the new disturbance. Where one of its pivots is not positive the disturbance grows within the step,
 //! and a shorter one tells how much. What buckles lets it grow without bounds; all else does not.
 
+use crate::archive::archived;
 use crate::plane::{Lateral, Plane, Slice};
 use crate::pose::State;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
@@ -96,6 +97,10 @@ pub struct Disturbance {
     arcs: Vec<f64>,
     before: (Vec<f64>, Vec<Motion>),
 }
+
+archived!(Motion { value, rate, rate_t });
+// [`Disturbance::copy_from`] makes the room for the pivots
+archived!(Disturbance { points, tip, arcs } but { pivots, before });
 
 impl Disturbance {
     /// Room for that of a rod with so many Gauss points at most; [`Self::begin`] comes next.

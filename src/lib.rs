@@ -13,7 +13,7 @@
 //! host =C=> fmi2 -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
 //!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
 //!      examples, tests -> rate -> formulation -> {energy, stepper}
-//!                       pose, rate -> {alpha, boundary, rod, mesh, so3}
+//!                       pose, rate -> {alpha, boundary, rod, mesh, archive, so3}
 //! ```
 //!
 //! The rod is formulated twice, on the same rods, meshes, ends, time schemes and rotations: by [`pose`], which
@@ -30,10 +30,11 @@
 //!    line, and the rest compiles.
 //! 3. `unsafe` stands only at the C boundary, in `fmi2::abi` and its counterpart `fmi2::host`. No panic, print, thread,
 //!    clock or mutable static in the library.
-//! 4. [`sweep`] and [`rate::Band`] know blocks and no rod, [`alpha`], [`runge_kutta`] and [`rosenbrock`] know numbers
-//!    and no rod; only [`pose`], [`plane`] and [`rate`] know which unknowns a section has.
+//! 4. [`sweep`] and [`rate::Band`] know blocks and no rod, [`archive`], [`alpha`], [`runge_kutta`] and [`rosenbrock`] know
+//!    numbers and no rod; only [`pose`], [`plane`] and [`rate`] know which unknowns a section has.
 //! 5. [`pose::State`] and [`rate::State`] are plain data; everything a later step depends on is in them. Rebuilding the
-//!    storage around them changes no bit of any result. Same inputs, same bits.
+//!    storage around them changes no bit of any result. Same inputs, same bits, also after [`archive`] has saved and
+//!    loaded them.
 //! 6. Stepping allocates nothing. A failed step leaves the state as it was and says why ([`stepper::Diverged`]); the retry
 //!    with smaller steps lives in [`integrator`], never in Newton.
 //!
@@ -55,6 +56,7 @@
 #![deny(unsafe_code)]
 
 pub mod so3;
+pub mod archive;
 pub mod mesh;
 pub mod rod;
 pub mod sweep;

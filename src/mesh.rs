@@ -3,6 +3,7 @@
 //! An s-stage Gauss rule collocates Y' at the points c_k: Y_k = Y₀ + h Σ a_kl Y'_l, Y₁ = Y₀ + h Σ b_l Y'_l, of order
 //! 2s. s = 1 is the midpoint box.
 
+use crate::archive::archived;
 use nalgebra::{Matrix4, Vector3};
 use std::array::from_fn;
 
@@ -176,13 +177,15 @@ impl Origin {
 }
 
 /// One cell: its length and the curvature of the unstressed rod in it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
     /// h, m.
     pub length: f64,
     /// κ̂, body frame, 1/m.
     pub kappa_rest: Vector3<f64>,
 }
+
+archived!(Cell { length, kappa_rest });
 
 /// The cells from the base to the tip, with one rule for all.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,6 +12,7 @@
 //! few digits do not shake the acceleration, and a path that missed something returns. Rotations do the same through
 //! exp, in world axes.
 
+use crate::archive::archived;
 use crate::boundary::Support;
 use crate::so3;
 use nalgebra::{Matrix3, Vector3};
@@ -98,6 +99,10 @@ pub struct Segment {
     /// The same of the orientation, rad.
     pub angle: f64,
 }
+
+archived!(Sample { position, rotation, velocity, angular_velocity });
+archived!(Twist { linear, angular });
+archived!(Path { base, last, rate, jerk, last_step, samples } but { given });
 
 impl Sample {
     fn twist(&self) -> Twist {

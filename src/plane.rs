@@ -28,10 +28,11 @@
 //! sections is left out, so that a tip mass on a rod with drag lowers the order in time.
 
 use crate::alpha::Motion;
+use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive, Held, Support};
 use crate::energy::{Energy, Powers};
 use crate::mesh::{self, Gauss, MAX_STAGES, Mesh, Origin, Series};
-use crate::pose::{self, State};
+use crate::pose::{self, Memory, State};
 use crate::rod::Rod;
 use crate::rosenbrock::Rosenbrock;
 use crate::sweep::Singular;
@@ -378,6 +379,23 @@ pub struct Kept {
     section: Section,
     ends: Ends,
     drive: Drive,
+}
+
+archived!(Frame { e, normal, axis, section });
+archived!(Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia });
+archived!(Ends { tangent, angle, rate, turning, velocity, acceleration, force, moment });
+
+impl Archived for Kept {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        let Self { cells, points, frame, section, ends, drive } = self;
+        cells.visit(archive)?;
+        points.resize(cells.len(), Points::default());
+        points.as_mut_slice().visit(archive)?;
+        frame.visit(archive)?;
+        section.visit(archive)?;
+        ends.visit(archive)?;
+        drive.visit(archive)
+    }
 }
 
 /// How a cell is bent, as [`crate::refine`] wants to know it.
@@ -1211,11 +1229,6 @@ impl Plane {
         self.see(drive);
     }
 
-    /// Whether the instant last looked at is the present.
-    pub fn is_seen(&self) -> bool {
-        self.seen.is_some()
-    }
-
     /// Order of its steps.
     pub fn order(&self) -> i32 {
         self.method.order as i32
@@ -1461,9 +1474,11 @@ impl Plane {
         let Node { angle: [angle, rate, turning], position, velocity, acceleration, force, moment } = self.tip;
         let (node, last) = (self.cells.len(), state.memory.len() - 1);
         state.nodes[node] = of(angle, before, position, force, moment, acceleration);
-        let tip = &mut state.memory[last];
-        tip.spin = Motion::starting(axis * rate, axis * turning, zero);
-        tip.travel = Motion::starting(frame.vector(velocity), free(velocity, acceleration), zero);
+        state.memory[last] = Memory {
+            spin: Motion::starting(axis * rate, axis * turning, zero),
+            travel: Motion::starting(frame.vector(velocity), free(velocity, acceleration), zero),
+            ..Memory::default()
+        };
     }
 
     /// The present, to be kept in the same place again and again.

@@ -41,6 +41,7 @@
 #![allow(non_snake_case)]
 
 use crate::alpha::{Motion, Rate, Scheme};
+use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Held, Support};
 use crate::mesh::{Gauss, MAX_STAGES, Mesh};
 use crate::rod::Rod;
@@ -130,6 +131,24 @@ pub struct State {
     pub scheme: Scheme,
     /// Acceleration row of that step.
     pub row: Row,
+}
+
+archived!(Section { position, rotation, turn, force, moment, acceleration });
+// a stage sets what it knows beforehand
+archived!(Memory { spin, travel, kappa, strain } but { known });
+
+/// All but the number of cells: the lists are to be as long as those saved.
+impl Archived for State {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        let Self { nodes, points, memory, boundary, dt, scheme, row } = self;
+        nodes.as_mut_slice().visit(archive)?;
+        points.as_mut_slice().visit(archive)?;
+        memory.as_mut_slice().visit(archive)?;
+        boundary.visit(archive)?;
+        dt.visit(archive)?;
+        scheme.visit(archive)?;
+        archive.choose(row, &[Row::Rotations, Row::Positions])
+    }
 }
 
 /// Where the acceleration of the centreline comes from.

@@ -30,6 +30,7 @@
 // J is a matrix
 #![allow(non_snake_case)]
 
+use crate::archive::archived;
 use crate::boundary::{Boundary, Drive};
 use crate::mesh::{Cell, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::plane::{Bending, Plane};
@@ -89,6 +90,10 @@ pub struct Refiner {
     series: Series,
     kept: Vec<f64>,
 }
+
+archived!(Refiner { waited, lately } but {
+    tolerance, most_cells, coarsest, rule, errors, turns, places, cells, origins, series, kept
+});
 
 impl Refiner {
     /// For rods on `coarsest`, or what becomes of it: none of its cells will be joined, and there will be `most_cells` at

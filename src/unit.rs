@@ -4,6 +4,7 @@
 //! rod is moved to the tolerance ([`crate::integrator`]). What the host may set is checked here, and errors name it.
 
 use crate::alpha::Scheme;
+use crate::archive::{self, Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive, Rates};
 use crate::energy::Energy;
 use crate::integrator::{Effort, Ends, Failed, Integrator, Way};
@@ -79,6 +80,35 @@ pub struct Parameters {
     pub quasi_static: bool,
 }
 
+archived!(Parameters {
+    length,
+    radius,
+    density,
+    youngs_modulus,
+    shear_modulus,
+    section_area,
+    section_second_moment,
+    section_torsion_constant,
+    section_shear_correction,
+    rest_curvature,
+    gravity,
+    damping_bending,
+    damping_twist,
+    damping_drag,
+    tip_mass,
+    tip_inertia,
+    extensible,
+    base_motion,
+    cells,
+    stages,
+    step,
+    tolerance,
+    spectral_radius,
+    start_in_equilibrium,
+    planar,
+    quasi_static,
+});
+
 impl Default for Parameters {
     /// A soft rubber rod of 1 m.
     fn default() -> Self {
@@ -130,6 +160,8 @@ pub struct Inputs {
     pub tip_moment: Vector3<f64>,
 }
 
+archived!(Inputs { base_position, base_orientation, base_velocity, base_angular_velocity, tip_force, tip_moment });
+
 impl Default for Inputs {
     /// A base at rest from which the rod leaves along +x, no loads.
     fn default() -> Self {
@@ -168,6 +200,19 @@ pub struct Outputs {
     /// What it took since the start.
     pub solver: Effort,
 }
+
+archived!(Outputs {
+    tip_position,
+    tip_orientation,
+    tip_velocity,
+    tip_angular_velocity,
+    base_reaction_force,
+    base_reaction_moment,
+    stations,
+    energy,
+    cells,
+    solver
+});
 
 /// What a variable may be set to, beyond being finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -334,9 +379,21 @@ const DISAGREEMENT: f64 = 0.02;
 /// Internal steps in a communication step beyond which the host has asked for something else than it wants.
 const MAX_INTERNAL_STEPS: f64 = 1e7;
 
+/// What a rod was started from: it settles all that is fixed, and how much room there is.
+#[derive(Clone, Debug, Default)]
+struct Start {
+    parameters: Parameters,
+    inputs: Inputs,
+    /// Of the experiment.
+    tolerance: Option<f64>,
+}
+
+archived!(Start { parameters, inputs, tolerance });
+
 /// One rod, started and ready to step.
 #[derive(Clone, Debug)]
 pub struct Unit {
+    start: Start,
     integrator: Integrator,
     /// Longest internal step, where the host gives it, s.
     step: Option<f64>,
@@ -480,11 +537,7 @@ impl Parameters {
     /// # Errors
     /// [`Error`] names the parameter that is not allowed together with others, or says why there is no start.
     pub fn start(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
-        let rod = self.rod();
-        let (mesh, mut refiner) = self.mesh(&rod, boundary, tolerance)?;
-        let (way, step) = (self.way(&rod, tolerance), self.longest_step(&rod, tolerance));
-        let state = State::at_rest_shape(&mesh, &boundary.base);
-        let mut stepper = Stepper::new(mesh, rod, state);
+        let (mut stepper, mut refiner) = self.unstressed(boundary, tolerance)?;
         if self.start_in_equilibrium || self.quasi_static {
             let found = match &mut refiner {
                 Some(refiner) => {
@@ -499,8 +552,27 @@ impl Parameters {
                 return Err(Error::UnstableEquilibrium { omega_squared: mode.omega_squared });
             }
         }
-        let scheme = Scheme::from_spectral_radius(self.spectral_radius);
+        let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
         Integrator::new(stepper, refiner, way, scheme, step, boundary).map_err(Error::NoStart)
+    }
+
+    /// The same rod where it has not been started.
+    fn room(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
+        let (stepper, refiner) = self.unstressed(boundary, tolerance)?;
+        let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
+        Ok(Integrator::room(stepper, refiner, way, scheme, step, boundary))
+    }
+
+    fn unstressed(&self, boundary: &Boundary, tolerance: f64) -> Result<(Stepper, Option<Refiner>), Error> {
+        let rod = self.rod();
+        let (mesh, refiner) = self.mesh(&rod, boundary, tolerance)?;
+        let state = State::at_rest_shape(&mesh, &boundary.base);
+        Ok((Stepper::new(mesh, rod, state), refiner))
+    }
+
+    fn motion(&self, rod: &Rod, tolerance: f64) -> (Way, Scheme, f64) {
+        let scheme = Scheme::from_spectral_radius(self.spectral_radius);
+        (self.way(rod, tolerance), scheme, self.longest_step(rod, tolerance))
     }
 
     fn way(&self, rod: &Rod, tolerance: f64) -> Way {
@@ -581,6 +653,17 @@ impl Unit {
     /// # Errors
     /// [`Error`] names the parameter or input that is not allowed, or says why there is no start.
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
+        let start = Start { parameters: parameters.clone(), inputs: inputs.clone(), tolerance };
+        let mut unit = Self::of(start, Parameters::start)?;
+        unit.read_out();
+        Ok(unit)
+    }
+
+    fn of(
+        start: Start,
+        begin: impl Fn(&Parameters, &Boundary, f64) -> Result<Integrator, Error>,
+    ) -> Result<Self, Error> {
+        let Start { parameters, inputs, tolerance } = &start;
         parameters.validate()?;
         inputs.validate()?;
         let given = |value: &f64| value.is_finite() && *value > 0.0;
@@ -598,9 +681,8 @@ impl Unit {
             tip_moment: inputs.tip_moment,
             ..Boundary::hanging_from(*path.base(), parameters.gravity)
         };
-        let integrator = parameters.start(&boundary, tolerance)?;
-        let mut unit = Self {
-            integrator,
+        Ok(Self {
+            integrator: begin(parameters, &boundary, tolerance)?,
             step: (parameters.step > 0.0 || parameters.extensible)
                 .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
             quasi_static: parameters.quasi_static,
@@ -608,9 +690,8 @@ impl Unit {
             path,
             warned: false,
             outputs: Outputs::default(),
-        };
-        unit.read_out();
-        Ok(unit)
+            start,
+        })
     }
 
     /// Advances by one communication step of `step_size` s, from the inputs at its start.
@@ -712,5 +793,29 @@ impl Unit {
             ..self.outputs
         };
         integrator.centreline(&mut self.outputs.stations);
+    }
+}
+
+// of a unit that was started alike
+archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static });
+
+/// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
+/// for bit as the one that was saved.
+impl Archived for Option<Box<Unit>> {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        let mut is_some = self.is_some();
+        is_some.visit(archive)?;
+        if !is_some {
+            *self = None;
+            return Ok(());
+        }
+        let mut start = self.as_ref().map(|unit| unit.start.clone()).unwrap_or_default();
+        start.visit(archive)?;
+        let alike = |unit: &mut Box<Unit>| archive::are_same(&mut unit.start, &mut start);
+        if archive.is_loading() && !self.as_mut().is_some_and(alike) {
+            let room = Unit::of(start, Parameters::room);
+            *self = Some(Box::new(room.map_err(|error| Corrupt::Refused { why: error.to_string() })?));
+        }
+        self.as_deref_mut().map_or(Ok(()), |unit| unit.visit(archive))
     }
 }

@@ -4,6 +4,7 @@
 #![allow(unsafe_code)]
 
 use cosserat_rod::alpha::Scheme;
+use cosserat_rod::archive;
 use cosserat_rod::boundary::{Boundary, Drive, Held, Rates, Support};
 use cosserat_rod::mesh::Mesh;
 use cosserat_rod::plane::Plane;
@@ -185,6 +186,32 @@ fn communication_steps_allocate_nothing_whatever_becomes_of_them() {
             },
             "{name}"
         );
+    }
+}
+
+#[test]
+fn steps_after_a_load_allocate_nothing() {
+    // cells are halved, and the plane is left, in a unit that was made for a state of before that
+    let parameters = Parameters { tolerance: 1e-4, ..Parameters::default() };
+    let mut unit = Some(Box::new(Unit::new(&parameters, &Inputs::default(), None).unwrap()));
+    let pushed = Inputs { tip_force: Vector3::new(0.0, 0.1, 0.0), ..Inputs::default() };
+    let still = Inputs::default();
+    let run = |unit: &mut Option<Box<Unit>>| {
+        let unit = unit.as_mut().unwrap();
+        let cells = unit.outputs().cells;
+        for i in 0..60 {
+            unit.advance(if i < 40 { &still } else { &pushed }, 0.01).unwrap();
+        }
+        assert!(unit.outputs().cells > cells && !unit.outputs().solver.planar);
+    };
+    let mut saved = Vec::new();
+    archive::save(&mut unit, &mut saved);
+    let mut made = None;
+    for unit in [&mut unit, &mut made] {
+        archive::load(unit, &saved).unwrap();
+        assert_eq!(allocations(|| run(unit)), 0);
+        archive::load(unit, &saved).unwrap();
+        assert_eq!(allocations(|| run(unit)), 0);
     }
 }
 
