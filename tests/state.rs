@@ -1,10 +1,16 @@
-//! A unit that is saved and loaded goes on as if nothing had been: outputs and states bit for bit, in the unit itself and
-//! in one that is made for it.
+//! A unit that is saved and loaded goes on as if nothing had been: outputs and states bit for bit, in the unit itself, in
+//! one that is made for it, and in another process.
 
 use cosserat_rod::archive::{Corrupt, load, save};
+use cosserat_rod::fmi2::host::{Fmu, Slave};
+use cosserat_rod::fmi2::variables::Kind;
+use cosserat_rod::package;
 use cosserat_rod::so3;
 use cosserat_rod::unit::{Inputs, Outputs, Parameters, Unit};
 use nalgebra::Vector3;
+use std::path::Path;
+use std::process::Command;
+use std::{env, fs, ptr};
 
 type Vec3 = Vector3<f64>;
 
@@ -252,4 +258,56 @@ fn what_no_unit_can_be_made_of_is_refused() {
     saved[1..9].copy_from_slice(&(-1f64).to_le_bytes());
     let error = load(&mut unit, &saved).unwrap_err();
     assert!(matches!(error, Corrupt::Refused { .. }) && error.to_string().contains("length = -1"), "{error}");
+}
+
+/// The Real outputs over the steps from `first` on, with a push aside that takes the rod out of its plane.
+fn go_on(fmu: &Fmu, slave: &Slave, first: i32) -> String {
+    let variables = fmu.description.variables.values();
+    let outputs = variables.filter(|variable| variable.causality == "output" && variable.kind == Kind::Real);
+    let references: Vec<_> = outputs.map(|variable| variable.reference).collect();
+    let mut values = vec![0.0; references.len()];
+    let push = fmu.description.reference("tip.force[2]", Kind::Real).unwrap();
+    let mut bits = String::new();
+    for i in first..first + STEPS as i32 {
+        slave.set_real(&[push], &[if i % 40 > 30 { 0.02 } else { 0.0 }]).unwrap();
+        slave.do_step(STEP * f64::from(i), STEP).unwrap();
+        slave.get_real(&references, &mut values).unwrap();
+        bits.extend(values.iter().map(|value| format!("{:016x}", value.to_bits())));
+    }
+    bits
+}
+
+#[test]
+fn a_state_goes_on_in_another_process() {
+    // which is this test again, with a state to go on from
+    const STATE: &str = "STATE_TO_GO_ON_FROM";
+    const BEFORE: i32 = 20;
+    let fmu = Fmu::from_library(&package::library().unwrap()).unwrap();
+    let slave = fmu.instantiate("rod", false).unwrap();
+    if let Some(path) = env::var_os(STATE) {
+        let state = slave.deserialize(&fs::read(path).unwrap()).unwrap();
+        slave.set_state(state).unwrap();
+        println!("{}", go_on(&fmu, &slave, BEFORE));
+        return;
+    }
+    let length = fmu.description.reference("length", Kind::Real).unwrap();
+    slave.set_real(&[length], &[0.8]).unwrap();
+    slave.setup_experiment(0.0, None, Some(1e-4)).unwrap();
+    slave.enter_initialization_mode().unwrap();
+    slave.exit_initialization_mode().unwrap();
+    (0..BEFORE).for_each(|i| slave.do_step(STEP * f64::from(i), STEP).unwrap());
+    let mut state = ptr::null_mut();
+    slave.get_state(&mut state).unwrap();
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("state");
+    fs::write(&path, slave.serialize(state).unwrap()).unwrap();
+    let here = go_on(&fmu, &slave, BEFORE);
+    let output = Command::new(env::current_exe().unwrap())
+        .args(["--exact", "a_state_goes_on_in_another_process", "--nocapture"])
+        .env(STATE, &path)
+        .output()
+        .unwrap();
+    let there = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && there.contains(&here), "{}", String::from_utf8_lossy(&output.stderr));
+    slave.set_state(state).unwrap();
+    assert!(go_on(&fmu, &slave, BEFORE) == here);
 }

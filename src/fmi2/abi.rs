@@ -3,7 +3,8 @@
 //!
 //! The only module of the unit with `unsafe`. It relies on what the standard asks of a host: an instance handle comes
 //! from `fmi2Instantiate` and is not used after `fmi2FreeInstance` nor by two threads at once, strings end with a null
-//! byte, and arrays have the length that is passed with them. Null pointers are met with an error all the same.
+//! byte, and arrays have the length that is passed with them. Null pointers are met with an error all the same, and the
+//! handle of a saved state is looked up and never followed.
 //!
 //! A panic ends at the guard. The hook that reports it is left alone: it belongs to the process where the library is
 //! linked statically, replacing it would be global state, and its line on standard error names the place of what is
@@ -203,6 +204,15 @@ unsafe fn slice_mut<'a, T>(pointer: *mut T, count: usize, argument: &'static str
     }
 }
 
+/// # Safety
+/// As for [`slice_mut`], of one value.
+unsafe fn one<'a, T>(pointer: *mut T, argument: &'static str) -> Result<&'a mut T, Failure> {
+    match unusable(pointer, 1) {
+        true => Err(Failure::NullPointer { argument }),
+        false => Ok(unsafe { &mut *pointer }),
+    }
+}
+
 fn unusable<T>(pointer: *const T, count: usize) -> bool {
     pointer.is_null() || !pointer.is_aligned() || count > isize::MAX as usize / size_of::<T>()
 }
@@ -284,8 +294,6 @@ unsafe fn status<T>(
     unsafe { call(component, function, body) }
 }
 
-const STATES: &str = "saving and restoring the state is";
-const SERIALIZED: &str = "serializing the state is";
 const DIRECTIONAL: &str = "directional derivatives are";
 const INPUT_DERIVATIVES: &str = "derivatives of inputs are";
 const OUTPUT_DERIVATIVES: &str = "derivatives of outputs are";
@@ -480,47 +488,77 @@ unsafe extern "C" fn fmi2SetString(
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetFMUstate(c: fmi2Component, _state: *mut fmi2FMUstate) -> fmi2Status {
-    unsafe { not_supported(c, Function::GetFMUstate, STATES) }
+unsafe extern "C" fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status {
+    let body = |instance: &mut Instance| {
+        let state = unsafe { one(FMUstate, "FMUstate")? };
+        *state = ptr::without_provenance_mut(instance.save_state(state.addr())?);
+        Ok(None)
+    };
+    unsafe { call(c, Function::GetFMUstate, body) }
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, _state: fmi2FMUstate) -> fmi2Status {
-    unsafe { not_supported(c, Function::SetFMUstate, STATES) }
+unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
+    unsafe { call(c, Function::SetFMUstate, |instance| instance.load_state(FMUstate.addr())) }
 }
 
+/// Nothing to free is nothing to do, wherever it is said.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2FreeFMUstate(c: fmi2Component, _state: *mut fmi2FMUstate) -> fmi2Status {
-    unsafe { not_supported(c, Function::FreeFMUstate, STATES) }
+unsafe extern "C" fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status {
+    let body = |instance: &mut Instance| {
+        if !FMUstate.is_null() {
+            let state = unsafe { one(FMUstate, "FMUstate")? };
+            instance.free_state(state.addr())?;
+            *state = ptr::null_mut();
+        }
+        Ok(None)
+    };
+    unsafe { call(c, Function::FreeFMUstate, body) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2SerializedFMUstateSize(
     c: fmi2Component,
-    _state: fmi2FMUstate,
-    _size: *mut usize,
+    FMUstate: fmi2FMUstate,
+    size: *mut usize,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::SerializedFMUstateSize, SERIALIZED) }
+    let body = |instance: &mut Instance| {
+        let size = unsafe { one(size, "size")? };
+        *size = instance.state_size(FMUstate.addr())?;
+        Ok(None)
+    };
+    unsafe { call(c, Function::SerializedFMUstateSize, body) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2SerializeFMUstate(
     c: fmi2Component,
-    _state: fmi2FMUstate,
-    _serialized: *mut fmi2Byte,
-    _size: usize,
+    FMUstate: fmi2FMUstate,
+    serializedState: *mut fmi2Byte,
+    size: usize,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::SerializeFMUstate, SERIALIZED) }
+    let body = |instance: &mut Instance| {
+        let bytes = unsafe { slice_mut(serializedState.cast(), size, "serializedState")? };
+        instance.serialize(FMUstate.addr(), bytes)
+    };
+    unsafe { call(c, Function::SerializeFMUstate, body) }
 }
 
+/// The state is always a new one: only of `fmi2GetFMUstate` the standard says what stands where it is to be put.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2DeSerializeFMUstate(
     c: fmi2Component,
-    _serialized: *const fmi2Byte,
-    _size: usize,
-    _state: *mut fmi2FMUstate,
+    serializedState: *const fmi2Byte,
+    size: usize,
+    FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::DeSerializeFMUstate, SERIALIZED) }
+    let body = |instance: &mut Instance| {
+        let bytes = unsafe { slice(serializedState.cast(), size, "serializedState")? };
+        let state = unsafe { one(FMUstate, "FMUstate")? };
+        *state = ptr::without_provenance_mut(instance.deserialize(bytes)?);
+        Ok(None)
+    };
+    unsafe { call(c, Function::DeSerializeFMUstate, body) }
 }
 
 #[unsafe(no_mangle)]
@@ -558,7 +596,7 @@ unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     unsafe { not_supported(c, Function::GetRealOutputDerivatives, OUTPUT_DERIVATIVES) }
 }
 
-/// Without states there is nothing the host could go back to, so the last argument says nothing.
+/// States are kept as long as the host does not free them, whatever the last argument says of going back to them.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2DoStep(
     c: fmi2Component,

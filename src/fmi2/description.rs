@@ -121,8 +121,8 @@ fn co_simulation(xml: &mut Xml) -> io::Result<()> {
             ("canRunAsynchronuously", "false"),
             ("canBeInstantiatedOnlyOncePerProcess", "false"),
             ("canNotUseMemoryManagementFunctions", "true"),
-            ("canGetAndSetFMUstate", "false"),
-            ("canSerializeFMUstate", "false"),
+            ("canGetAndSetFMUstate", "true"),
+            ("canSerializeFMUstate", "true"),
             ("providesDirectionalDerivative", "false"),
         ])
         .write_empty()?;

@@ -491,6 +491,8 @@ impl Drop for Slave<'_> {
 ///
 /// # Errors
 /// [`Error::Refused`] with the lines of the log since the last call of [`Log::take`]; [`Error::Lengths`].
+// a unit that follows the handle of a state blindly is trusted with it, as with all else
+#[allow(clippy::not_unsafe_ptr_arg_deref)]
 impl Slave<'_> {
     /// The bare handle.
     pub fn component(&self) -> fmi2Component {
@@ -565,6 +567,42 @@ impl Slave<'_> {
     pub fn do_step(&self, time: f64, step_size: f64) -> Result<(), Error> {
         let status = unsafe { (self.functions.DoStep)(self.component, time, step_size, fmi2Boolean(1)) };
         self.check("fmi2DoStep", status)
+    }
+
+    /// `fmi2GetFMUstate`, in place of `state` unless that is null.
+    pub fn get_state(&self, state: &mut fmi2FMUstate) -> Result<(), Error> {
+        self.check("fmi2GetFMUstate", unsafe { (self.functions.GetFMUstate)(self.component, state) })
+    }
+
+    /// `fmi2SetFMUstate`
+    pub fn set_state(&self, state: fmi2FMUstate) -> Result<(), Error> {
+        self.check("fmi2SetFMUstate", unsafe { (self.functions.SetFMUstate)(self.component, state) })
+    }
+
+    /// `fmi2FreeFMUstate`
+    pub fn free_state(&self, state: &mut fmi2FMUstate) -> Result<(), Error> {
+        self.check("fmi2FreeFMUstate", unsafe { (self.functions.FreeFMUstate)(self.component, state) })
+    }
+
+    /// `fmi2SerializedFMUstateSize` and `fmi2SerializeFMUstate`
+    pub fn serialize(&self, state: fmi2FMUstate) -> Result<Vec<u8>, Error> {
+        let mut size = 0;
+        let status = unsafe { (self.functions.SerializedFMUstateSize)(self.component, state, &mut size) };
+        self.check("fmi2SerializedFMUstateSize", status)?;
+        let mut bytes = vec![0u8; size];
+        let start = bytes.as_mut_ptr().cast();
+        let status = unsafe { (self.functions.SerializeFMUstate)(self.component, state, start, size) };
+        self.check("fmi2SerializeFMUstate", status)?;
+        Ok(bytes)
+    }
+
+    /// `fmi2DeSerializeFMUstate`
+    pub fn deserialize(&self, bytes: &[u8]) -> Result<fmi2FMUstate, Error> {
+        let (mut state, start) = (ptr::null_mut(), bytes.as_ptr().cast());
+        let deserialize = self.functions.DeSerializeFMUstate;
+        let status = unsafe { deserialize(self.component, start, bytes.len(), &mut state) };
+        self.check("fmi2DeSerializeFMUstate", status)?;
+        Ok(state)
     }
 
     /// `fmi2GetReal`

@@ -5,14 +5,18 @@
 //! stays. So the standard's state *error* does not exist here; a failed step may be repeated, or the run terminated.
 
 use super::description::{self, ALL, LOG_CATEGORIES};
+use super::saved::{self, Unreadable};
 use super::variables::{self, Kind, Variable};
+use crate::archive::{self, Archive, Archived, Corrupt, archived};
 use crate::integrator::Effort;
 use crate::unit::{self, Allowed, Inputs, Parameters, Unit};
-use std::fmt;
+use std::collections::BTreeMap;
+use std::{fmt, mem, ptr};
 
 /// Where an instance stands in its life.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
+    #[default]
     Instantiated,
     Initialization,
     /// At a communication point.
@@ -170,6 +174,13 @@ pub enum Failure {
     WrongStatusKind {
         given: i32,
     },
+    UnknownState,
+    WrongSize {
+        given: usize,
+        expected: usize,
+    },
+    Unreadable(Unreadable),
+    Corrupt(Corrupt),
     Unit(unit::Error),
     Panic {
         message: String,
@@ -267,6 +278,15 @@ impl fmt::Display for Failure {
                 write!(f, "fmi2{asked:?} is not available: a step is finished when fmi2DoStep returns")
             }
             Self::WrongStatusKind { given } => write!(f, "status kind {given} is unknown or not of this type"),
+            Self::UnknownState => write!(
+                f,
+                "FMUstate is none that this instance has saved and not freed; one of another instance is to be serialized"
+            ),
+            Self::WrongSize { given, expected } => {
+                write!(f, "size = {given} is not allowed: the serialized state has {expected} bytes")
+            }
+            Self::Unreadable(error) => write!(f, "this is no saved state: {error}"),
+            Self::Corrupt(error) => write!(f, "this is no saved state: {error}"),
             Self::Unit(error) => error.fmt(f),
             Self::Panic { message } => write!(f, "panic, the instance can only be freed: {message}"),
         }
@@ -352,15 +372,42 @@ const PANICKING: &str = "panic in fmi2DoStep";
 #[derive(Debug)]
 pub struct Instance {
     name: String,
-    mode: Mode,
+    guid: String,
     debug: Debug,
     variables: Vec<Variable>,
+    now: Simulation,
+    /// What a saved state is loaded into; it then changes places with the present, which stays if that fails.
+    spare: Simulation,
+    /// The states that the host may name, by their addresses, which are told apart from all that is not among them.
+    saved: BTreeMap<usize, Box<Saved>>,
+}
+
+/// Where the simulation stands: all that a saved state holds.
+#[derive(Debug, Default)]
+struct Simulation {
+    mode: Mode,
     experiment: Experiment,
     parameters: Parameters,
     inputs: Inputs,
     /// Before the first step a set drops it, and a get or the end of the initialisation builds it.
     unit: Option<Box<Unit>>,
     time: f64,
+}
+
+archived!(Simulation { mode, experiment, parameters, inputs, unit, time });
+archived!(Experiment { tolerance, start, stop });
+
+/// An instance that is lost is not saved.
+impl Archived for Mode {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        archive.choose(self, &[Self::Instantiated, Self::Initialization, Self::StepComplete, Self::Terminated])
+    }
+}
+
+/// A state, as [`archive::save`] writes it.
+#[derive(Debug, Default)]
+struct Saved {
+    bytes: Vec<u8>,
 }
 
 /// What [`Instance::setup_experiment`] was told.
@@ -390,31 +437,29 @@ impl Instance {
         }
         Ok(Self {
             name,
-            mode: Mode::Instantiated,
+            guid: guid.to_owned(),
             debug: Debug { on: debug, categories: Vec::new() },
             variables: variables::all(),
-            experiment: Experiment::default(),
-            parameters: Parameters::default(),
-            inputs: Inputs::default(),
-            unit: None,
-            time: 0.0,
+            now: Simulation::default(),
+            spare: Simulation::default(),
+            saved: BTreeMap::new(),
         })
     }
 
     /// The communication point.
     pub fn time(&self) -> f64 {
-        self.time
+        self.now.time
     }
 
     /// Whether the call is allowed now.
     pub fn admits(&self, function: Function) -> Result<(), Failure> {
         let allowed = function.allowed_in();
-        if allowed.contains(&self.mode) { Ok(()) } else { Err(Failure::WrongMode { mode: self.mode, allowed }) }
+        if allowed.contains(&self.now.mode) { Ok(()) } else { Err(Failure::WrongMode { mode: self.now.mode, allowed }) }
     }
 
     /// After a panic.
     pub fn give_up(&mut self) {
-        self.mode = Mode::Fatal;
+        self.now.mode = Mode::Fatal;
     }
 
     /// Whether a debug line of this category is to be logged.
@@ -447,38 +492,95 @@ impl Instance {
         if let Some(stop) = stop.filter(|stop| !(stop.is_finite() && *stop >= start)) {
             return Err(Failure::StopBeforeStart { start, stop });
         }
-        self.experiment = Experiment { tolerance: tolerance.filter(|tolerance| *tolerance > 0.0), start, stop };
-        self.time = start;
-        self.unit = None;
+        self.now.experiment = Experiment { tolerance: tolerance.filter(|tolerance| *tolerance > 0.0), start, stop };
+        self.now.time = start;
+        self.now.unit = None;
         Ok(None)
     }
 
     pub fn enter_initialization_mode(&mut self) -> Answer {
-        self.mode = Mode::Initialization;
+        self.now.mode = Mode::Initialization;
         Ok(None)
     }
 
     pub fn exit_initialization_mode(&mut self) -> Answer {
         let cells = self.unit()?.outputs().cells;
-        self.mode = Mode::StepComplete;
+        self.now.mode = Mode::StepComplete;
         Ok(Some(Note::Initialized { cells }))
     }
 
     pub fn terminate(&mut self) -> Answer {
         let Effort { steps, iterations, retries, .. } = self.unit()?.outputs().solver;
-        self.mode = Mode::Terminated;
+        self.now.mode = Mode::Terminated;
         Ok(Some(Note::Terminated { steps, iterations, retries }))
     }
 
     /// As after `fmi2Instantiate`; which debug lines the host wants is no part of the simulation and stays.
     pub fn reset(&mut self) -> Answer {
-        self.mode = Mode::Instantiated;
-        self.experiment = Experiment::default();
-        self.parameters = Parameters::default();
-        self.inputs = Inputs::default();
-        self.unit = None;
-        self.time = 0.0;
+        self.now = Simulation::default();
         Ok(None)
+    }
+
+    /// Saves the present: in place of a state, or as a new one where `state` is 0. Returns what the host is to name it by.
+    pub fn save_state(&mut self, state: usize) -> Result<usize, Failure> {
+        let mut new = Saved::default();
+        let place = if state == 0 { &mut new } else { self.saved.get_mut(&state).ok_or(Failure::UnknownState)? };
+        archive::save(&mut self.now, &mut place.bytes);
+        Ok(if state == 0 { self.keep(new) } else { state })
+    }
+
+    fn keep(&mut self, state: Saved) -> usize {
+        let state = Box::new(state);
+        let address = ptr::from_ref(&*state).addr();
+        self.saved.insert(address, state);
+        address
+    }
+
+    fn saved(&self, state: usize) -> Result<&Saved, Failure> {
+        match (state, self.saved.get(&state)) {
+            (0, _) => Err(Failure::NullPointer { argument: "FMUstate" }),
+            (_, saved) => saved.map(|saved| &**saved).ok_or(Failure::UnknownState),
+        }
+    }
+
+    /// Makes a saved state the present.
+    pub fn load_state(&mut self, state: usize) -> Answer {
+        // what is left of a state that could not be loaded is none
+        let mut next = mem::take(&mut self.spare);
+        archive::load(&mut next, &self.saved(state)?.bytes).map_err(Failure::Corrupt)?;
+        self.spare = mem::replace(&mut self.now, next);
+        Ok(None)
+    }
+
+    /// Forgets a saved state; 0 is none.
+    pub fn free_state(&mut self, state: usize) -> Answer {
+        if state != 0 {
+            self.saved.remove(&state).ok_or(Failure::UnknownState)?;
+        }
+        Ok(None)
+    }
+
+    /// Bytes of a saved state.
+    pub fn state_size(&self, state: usize) -> Result<usize, Failure> {
+        let Saved { bytes } = self.saved(state)?;
+        Ok(saved::HEADER + bytes.len())
+    }
+
+    /// Writes a saved state into as many bytes as it has.
+    pub fn serialize(&self, state: usize, into: &mut [u8]) -> Answer {
+        let Saved { bytes } = self.saved(state)?;
+        let sealed = saved::sealed(bytes, &self.guid);
+        if into.len() != sealed.len() {
+            return Err(Failure::WrongSize { given: into.len(), expected: sealed.len() });
+        }
+        into.copy_from_slice(&sealed);
+        Ok(None)
+    }
+
+    /// A saved state from the bytes of one; returns what the host is to name it by.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Result<usize, Failure> {
+        let bytes = saved::opened(bytes, &self.guid).map_err(Failure::Unreadable)?.to_vec();
+        Ok(self.keep(Saved { bytes }))
     }
 
     pub fn get<T: Scalar>(&mut self, references: &[u32], values: &mut [T]) -> Answer {
@@ -489,8 +591,8 @@ impl Instance {
         }
         for (&reference, value) in references.iter().zip(values) {
             let variable = self.variable(reference, T::KIND)?;
-            let given = variable.given(&mut self.parameters, &mut self.inputs);
-            let computed = || self.unit.as_ref().and_then(|unit| variable.computed(unit.outputs()));
+            let given = variable.given(&mut self.now.parameters, &mut self.now.inputs);
+            let computed = || self.now.unit.as_ref().and_then(|unit| variable.computed(unit.outputs()));
             if let Some(number) = given.or_else(computed) {
                 *value = T::from_f64(number);
             }
@@ -501,7 +603,7 @@ impl Instance {
     pub fn set<T: Scalar>(&mut self, references: &[u32], values: &[T]) -> Answer {
         for (&reference, value) in references.iter().zip(values) {
             let (variable, value) = (self.variable(reference, T::KIND)?, value.to_f64());
-            let settable = match self.mode {
+            let settable = match self.now.mode {
                 Mode::StepComplete => variable.is_settable_while_stepping(),
                 _ => !variable.is_output(),
             };
@@ -513,12 +615,12 @@ impl Instance {
             }
         }
         for (&reference, value) in references.iter().zip(values) {
-            self.variable(reference, T::KIND)?.set(&mut self.parameters, &mut self.inputs, value.to_f64());
+            self.variable(reference, T::KIND)?.set(&mut self.now.parameters, &mut self.now.inputs, value.to_f64());
         }
-        if self.mode != Mode::StepComplete {
-            self.unit = None;
-        } else if let Some(unit) = &mut self.unit {
-            unit.set_gravity(self.parameters.gravity);
+        if self.now.mode != Mode::StepComplete {
+            self.now.unit = None;
+        } else if let Some(unit) = &mut self.now.unit {
+            unit.set_gravity(self.now.parameters.gravity);
         }
         Ok(None)
     }
@@ -535,21 +637,21 @@ impl Instance {
         }
         check("currentCommunicationPoint", time, Allowed::Finite)?;
         check("communicationStepSize", step_size, Allowed::Positive)?;
-        let near = SAME_TIME[0] * step_size + SAME_TIME[1] * self.time.abs();
-        if (time - self.time).abs() > near {
-            return Err(Failure::WrongTime { given: time, expected: self.time });
+        let near = SAME_TIME[0] * step_size + SAME_TIME[1] * self.now.time.abs();
+        if (time - self.now.time).abs() > near {
+            return Err(Failure::WrongTime { given: time, expected: self.now.time });
         }
         let end = time + step_size;
-        if let Some(stop) = self.experiment.stop.filter(|stop| end > stop + near) {
+        if let Some(stop) = self.now.experiment.stop.filter(|stop| end > stop + near) {
             return Err(Failure::PastStopTime { end, stop });
         }
-        let inputs = self.inputs.clone();
-        let own_step = (time - self.time) + step_size;
+        let inputs = self.now.inputs.clone();
+        let own_step = (time - self.now.time) + step_size;
         let unit = self.unit()?;
         let retries = unit.outputs().solver.retries;
         let warning = unit.advance(&inputs, own_step)?;
         let retries = unit.outputs().solver.retries - retries;
-        self.time = end;
+        self.now.time = end;
         Ok(match warning {
             Some(warning) => Some(Note::Warning(warning)),
             None => (retries > 0).then_some(Note::Repeated { retries, end }),
@@ -558,7 +660,7 @@ impl Instance {
 
     pub fn last_successful_time(&self, kind: StatusKind) -> Result<f64, Failure> {
         match kind {
-            StatusKind::LastSuccessfulTime => Ok(self.time),
+            StatusKind::LastSuccessfulTime => Ok(self.now.time),
             _ => Err(kind.mismatch()),
         }
     }
@@ -578,11 +680,11 @@ impl Instance {
     }
 
     fn unit(&mut self) -> Result<&mut Unit, Failure> {
-        let unit = match self.unit.take() {
+        let unit = match self.now.unit.take() {
             Some(unit) => unit,
-            None => Box::new(Unit::new(&self.parameters, &self.inputs, self.experiment.tolerance)?),
+            None => Box::new(Unit::new(&self.now.parameters, &self.now.inputs, self.now.experiment.tolerance)?),
         };
-        Ok(self.unit.insert(unit))
+        Ok(self.now.unit.insert(unit))
     }
 }
 

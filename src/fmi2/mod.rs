@@ -1,13 +1,15 @@
 //! The unit as an FMI 2.0 co-simulation slave.
 //!
 //! ```text
-//! host =C=> abi -> instance -> variables -> unit
+//! host =C=> abi -> instance -> {saved, variables} -> unit
 //! description -> variables          host: the other side of the C boundary, for the demo, the tests and the benchmarks
 //! ```
 
 pub mod variables;
 
 pub mod description;
+
+mod saved;
 
 mod instance;
 

@@ -6,6 +6,7 @@ Needs what `tests/run` leaves in `target`: `CosseratRod.fmu`, the inputs `drive.
 
 import csv
 import math
+import multiprocessing
 import re
 import subprocess
 import sys
@@ -39,8 +40,7 @@ def unpacked(tmp_path_factory):
     return extract(FMU, unzipdir=tmp_path_factory.mktemp("fmu"))
 
 
-@pytest.fixture
-def instance(description, unpacked):
+def instantiated(description, unpacked):
     slave = FMU2Slave(
         guid=description.guid,
         unzipDirectory=unpacked,
@@ -48,6 +48,12 @@ def instance(description, unpacked):
         instanceName="rod",
     )
     slave.instantiate()
+    return slave
+
+
+@pytest.fixture
+def instance(description, unpacked):
+    slave = instantiated(description, unpacked)
     yield slave
     slave.freeInstance()
 
@@ -164,6 +170,58 @@ def test_a_refused_step_can_be_repeated(instance, reference):
             instance.doStep(currentCommunicationPoint=time, communicationStepSize=step)
     instance.doStep(currentCommunicationPoint=0.0, communicationStepSize=STEP)
     instance.terminate()
+
+
+def go_on(instance, description, first):
+    """All Real outputs over 60 steps, in which the tip is pushed out of the plane."""
+    real = [v for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
+    push = next(v.valueReference for v in description.modelVariables if v.name == "tip.force[2]")
+    outputs = []
+    for k in range(first, first + 60):
+        instance.setReal([push], [0.02 if k % 40 > 30 else 0.0])
+        instance.doStep(currentCommunicationPoint=STEP * k, communicationStepSize=STEP)
+        outputs.append(instance.getReal([v.valueReference for v in real]))
+    return np.array(outputs).tobytes()
+
+
+def go_on_from(serialized, unpacked, first):
+    description = read_model_description(FMU)
+    instance = instantiated(description, unpacked)
+    instance.setFMUState(instance.deserializeFMUState(serialized))
+    outputs = go_on(instance, description, first)
+    instance.freeInstance()
+    return outputs
+
+
+def test_a_state_goes_on_bit_for_bit_here_and_in_another_process(description, reference, instance, unpacked):
+    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
+    instance.setReal([reference["length"]], [0.8])
+    initialize(instance)
+    for k in range(20):
+        instance.doStep(currentCommunicationPoint=STEP * k, communicationStepSize=STEP)
+    state = instance.getFMUState()
+    serialized = instance.serializeFMUState(state)
+    once = go_on(instance, description, 20)
+    for _ in range(2):
+        instance.setFMUState(state)
+        assert go_on(instance, description, 20) == once
+    instance.freeFMUState(state)
+    with pytest.raises(FMICallException):
+        instance.setFMUState(state)
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(go_on_from, (serialized, unpacked, 20)) == once
+
+
+def test_a_broken_state_is_refused_and_changes_nothing(description, instance):
+    initialize(instance)
+    state = instance.getFMUState()
+    serialized = instance.serializeFMUState(state)
+    changed = bytes([serialized[-1] ^ 1])
+    for broken in (serialized[:-1], serialized[:-1] + changed, b"", description.guid.encode()):
+        with pytest.raises(FMICallException):
+            instance.deserializeFMUState(broken)
+    assert instance.serializeFMUState(instance.getFMUState()) == serialized
+    instance.doStep(currentCommunicationPoint=0.0, communicationStepSize=STEP)
 
 
 def test_a_foreign_guid_gives_no_instance(unpacked, description):
