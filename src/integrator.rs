@@ -205,7 +205,7 @@ enum Kind {
     Resting,
 }
 
-/// What became of a step in space.
+/// What became of a step.
 enum Outcome {
     Taken,
     /// A shorter one may do.
@@ -275,7 +275,7 @@ pub struct Integrator {
     simple: Pace,
     /// What gravity and bending can give the rod, J.
     large: f64,
-    /// Kinetic energy up to which it rests, over the large one: cells that are joined then bring nothing but waves.
+    /// Kinetic energy up to which it rests, over the large one.
     rest: f64,
     /// Error in a second that goes with the tolerance, over the length.
     drift: f64,
@@ -502,7 +502,7 @@ impl Integrator {
     /// Follows in the plane as long as the steps need not be too short, and if it is `watched`, as long as the rod would stay
     /// there; returns how far that was, s. Beyond that the rod is in space.
     fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64, watched: bool) -> f64 {
-        let Some(planar) = &mut self.planar else { return 0.0 };
+        let Some(mut planar) = self.planar.take() else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
         planar.plane.look(1.0, &begin);
@@ -510,65 +510,32 @@ impl Integrator {
         self.energy = self.energy.now(&planar.plane.energy());
         let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
         let (mut time, mut refuses) = (0.0, true);
-        while time < duration {
+        while time < duration && self.in_plane {
             let (dt, last) = Pace { shortest, ..planar.pace }.step(duration - time);
             let at = |since: f64| drive(time + since);
-            let error = planar.plane.attempt(&at, dt).map_or(f64::NAN, |estimate| estimate.position);
-            let mut fits = planar.pace.allows(dt, error);
-            if fits {
-                let begin = if works { planar.plane.power() } else { Powers::default() };
-                planar.plane.accept();
-                let mut work = Powers::default();
-                if works {
-                    planar.plane.look(0.5, &at(0.5 * dt));
-                    let middle = planar.plane.power();
-                    planar.plane.look(1.0, &at(dt));
-                    // Simpson's rule
-                    work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(planar.plane.power(), dt / 6.0);
-                } else {
-                    planar.plane.look(1.0, &at(dt));
-                }
-                let energy = self.energy.worked(&work).now(&planar.plane.energy());
-                if gain(&self.energy, &energy, &work, self.large) > GAIN * self.drift * dt.max(SUDDEN * planar.time) {
-                    planar.plane.take_back();
-                    planar.plane.look(1.0, &at(0.0));
-                    planar.pace.next = dt * LOST;
-                    fits = false;
-                } else if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
-                    let refused = refiner.refuse_plane(&mut planar.plane, &at(0.0));
-                    if refused != Ok(false) {
-                        // cells that cannot be started stay as they were
-                        refuses = refused.is_ok();
-                        planar.disturbance.go_on(&planar.plane);
-                        self.energy = self.energy.now(&planar.plane.energy());
-                        self.effort.retried();
-                        continue;
-                    }
-                }
-                if fits {
-                    self.energy = energy;
-                }
-            }
-            if !fits {
-                self.effort.retried();
-                if dt > shortest {
+            match self.attempt_in_plane(&mut planar, &at, dt, (works, refuses)) {
+                Outcome::Taken => {}
+                Outcome::TooCoarse(changed) => {
+                    refuses = changed;
                     continue;
                 }
-                write(&mut planar.plane, &mut self.stepper);
-                self.in_plane = false;
-                break;
+                Outcome::TooLong if dt > shortest => continue,
+                Outcome::TooLong => {
+                    write(&mut planar.plane, &mut self.stepper);
+                    self.in_plane = false;
+                    continue;
+                }
             }
-            self.effort.took(planar.plane.order(), dt, error);
-            self.effort.planar = true;
             let due = watched && planar.is_due(dt);
+            let joins = self.moves();
             if let Some((refiner, _)) = &mut self.refiners {
-                if refiner.adapt_plane(&mut planar.plane, &at(dt), self.energy.kinetic > self.rest * self.large)
-                    == Ok(true)
-                {
+                // cells that cannot be started stay as they were
+                let changed = refiner.adapt_plane(&mut planar.plane, &at(dt), joins) == Ok(true);
+                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+                if changed {
                     planar.disturbance.go_on(&planar.plane);
                     self.energy = self.energy.now(&planar.plane.energy());
                 }
-                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
             }
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
@@ -576,10 +543,65 @@ impl Integrator {
                 let most = ROUNDINGS * GROWN / planar.time;
                 planar.disturbance.disturb(&planar.plane, ROUNDINGS, most, &mut self.stepper.state);
                 self.in_plane = false;
-                break;
             }
         }
+        self.planar = Some(planar);
         time
+    }
+
+    /// Takes a step of `dt` s in the plane, if its error, its energy and, if it `refuses`, its cells are good enough. `drive`
+    /// is what acts since its beginning, and `works` if need be.
+    fn attempt_in_plane(
+        &mut self,
+        planar: &mut Planar,
+        drive: &impl Fn(f64) -> Drive,
+        dt: f64,
+        (works, refuses): (bool, bool),
+    ) -> Outcome {
+        let Planar { plane, pace, disturbance, time, .. } = planar;
+        let error = plane.attempt(drive, dt).map_or(f64::NAN, |estimate| estimate.position);
+        if !pace.allows(dt, error) {
+            self.effort.retried();
+            return Outcome::TooLong;
+        }
+        let begin = if works { plane.power() } else { Powers::default() };
+        plane.accept();
+        let mut work = Powers::default();
+        if works {
+            plane.look(0.5, &drive(0.5 * dt));
+            let middle = plane.power();
+            plane.look(1.0, &drive(dt));
+            // Simpson's rule
+            work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
+        } else {
+            plane.look(1.0, &drive(dt));
+        }
+        let energy = self.energy.worked(&work).now(&plane.energy());
+        if gain(&self.energy, &energy, &work, self.large) > GAIN * self.drift * dt.max(SUDDEN * *time) {
+            plane.take_back();
+            plane.look(1.0, &drive(0.0));
+            pace.next = dt * LOST;
+            self.effort.retried();
+            return Outcome::TooLong;
+        }
+        if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
+            let refused = refiner.refuse_plane(plane, &drive(0.0));
+            if refused != Ok(false) {
+                disturbance.go_on(plane);
+                self.energy = self.energy.now(&plane.energy());
+                self.effort.retried();
+                return Outcome::TooCoarse(refused.is_ok());
+            }
+        }
+        self.energy = energy;
+        self.effort.took(plane.order(), dt, error);
+        self.effort.planar = true;
+        Outcome::Taken
+    }
+
+    /// Whether cells that are joined would bring more than waves.
+    fn moves(&self) -> bool {
+        self.energy.kinetic > self.rest * self.large
     }
 
     /// Follows in space from `time` on, as long as the error allows; steps of generalized-α take over where they would be
@@ -592,8 +614,8 @@ impl Integrator {
             let simple = self.simple.next >= rest;
             let mut dt = if simple { rest } else { Pace { shortest, ..self.pace }.step(rest).0 };
             let outcome = match simple {
-                true => self.attempt(&TR_BDF2, drive, (time, dt), (false, refuses)),
-                false => self.attempt(&ESDIRK4, drive, (time, dt), (dt <= shortest, refuses)),
+                true => self.attempt_in_space(&TR_BDF2, drive, (time, dt), (false, refuses)),
+                false => self.attempt_in_space(&ESDIRK4, drive, (time, dt), (dt <= shortest, refuses)),
             };
             match outcome {
                 Outcome::Taken => {
@@ -619,11 +641,10 @@ impl Integrator {
                 }
             }
             time = if dt == rest { duration } else { time + dt };
-            let now = drive(time).boundary;
+            let (now, joins) = (drive(time).boundary, self.moves());
             if let Some((refiner, _)) = &mut self.refiners {
                 // cells that cannot be started stay as they were
-                let changed =
-                    refiner.adapt(&mut self.stepper, &now, self.energy.kinetic > self.rest * self.large) == Ok(true);
+                let changed = refiner.adapt(&mut self.stepper, &now, joins) == Ok(true);
                 self.effort.space_error = self.effort.space_error.max(refiner.estimated());
                 if changed {
                     self.see_energy(&now.gravity);
@@ -635,7 +656,7 @@ impl Integrator {
 
     /// Takes a step of `dt` s in space from `time` on, if it is good enough; one that `must` be is, as long as no energy
     /// grows: what it cannot follow may be off, and the estimate tells by how much. Its cells count if it `refuses`.
-    fn attempt(
+    fn attempt_in_space(
         &mut self,
         method: &'static RungeKutta,
         drive: &impl Fn(f64) -> Drive,

@@ -391,7 +391,7 @@ pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
     let shapes = [Shape::Disc, Shape::Square, Shape::Triangle, Shape::Diamond, Shape::Cross];
     let error: fn(&Chart, f64, &Point) -> Option<f64> = |_, tolerance, point| Some(point.tip_error? / tolerance);
     let cost: fn(&Chart, f64, &Point) -> Option<f64> = |chart, tolerance, point| {
-        let fixed = chart.outcome.points.iter().filter(|point| point.tolerance.is_none());
+        let fixed = chart.outcome.points.iter().filter(|point| point.tolerance.is_none() && !point.long_steps);
         let enough = fixed.filter(|point| point.tip_error.is_some_and(|error| error <= tolerance));
         Some(point.cpu / enough.map(|point| point.cpu).min_by(f64::total_cmp)?)
     };
@@ -399,7 +399,7 @@ pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
         text(page, "What the unit makes of a tolerance", (24.0, 22.0), 19.0, INK, HPos::Left)?;
         let panels = [
             ("error of the tip over the tolerance", error, (-4, 1), 3.0),
-            ("CPU time over that of the cheapest cells and steps which meet it", cost, (-1, 2), 2.0),
+            ("CPU time over that of the cheapest equal cells and steps", cost, (-1, 2), 2.0),
         ];
         for (number, (title, value, range, bound)) in panels.into_iter().enumerate() {
             let axes = Axes { time: (-6, -2), error: range };

@@ -38,6 +38,8 @@ pub struct Point {
     pub reaction_error: Option<f64>,
     /// What the code was asked for, if that and nothing else.
     pub tolerance: Option<f64>,
+    /// Whether its steps are longer than a communication step, as no unit can take them.
+    pub long_steps: bool,
 }
 
 /// The columns of its tables; a tolerance is in the setting.
@@ -75,7 +77,8 @@ impl Point {
             let (cpu, tip_error, reaction_error) = (number(4)?, number(5)?, number(6)?);
             let [scene, code, kind, setting] = [0, 1, 2, 3].map(|column| record[column].to_owned());
             if let Some(cpu) = cpu.filter(|_| tip_error.is_some() || reaction_error.is_some()) {
-                points.push(Self { scene, code, kind, setting, cpu, tip_error, reaction_error, tolerance: None });
+                let own = Self { scene, code, kind, setting, cpu, tip_error, reaction_error, ..Self::default() };
+                points.push(own);
             }
         }
         Ok(points)

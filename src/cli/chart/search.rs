@@ -330,6 +330,7 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
                 Resolution::Tolerance(tolerance) => Some(*tolerance),
                 Resolution::Grid { .. } => None,
             },
+            long_steps: matches!(resolution, Resolution::Grid { steps, .. } if *steps < run.tip.len() - 1),
         });
     }
     let mut notes = Vec::new();
