@@ -460,11 +460,36 @@ fn interfaces() {
     }
 }
 
+/// Communication steps of one rod, and of a thousand rods in turn: a swinging cord, in its plane and in space.
+fn many_rods() {
+    const RODS: usize = 1000;
+    println!("\nA communication step of 10 ms of a swinging cord, µs: alone, and as one of {RODS} that step in turn");
+    for planar in [true, false] {
+        let parameters = Parameters { planar, ..Parameters::default() };
+        let Ok(unit) = Unit::new(&parameters, &Inputs::default(), None) else { return };
+        let seconds = |count: usize| {
+            let mut units = vec![unit.clone(); count];
+            let sample = |_| {
+                let start = Instant::now();
+                for unit in &mut units {
+                    black_box(unit.advance(&Inputs::default(), 0.01).is_ok());
+                }
+                start.elapsed().as_secs_f64() / count as f64
+            };
+            median((0..50).map(sample).collect())
+        };
+        let (alone, one) = (seconds(1), seconds(RODS));
+        let place = if planar { "in its plane" } else { "in space" };
+        println!("{place:>14} {:>8.1} {:>8.1} {:>7.2}", alone * 1e6, one * 1e6, one / alone);
+    }
+}
+
 /// The tables, by name.
-const TABLES: [(&str, fn()); 6] = [
+const TABLES: [(&str, fn()); 7] = [
     ("iterations", iterations),
     ("steps", whole_steps),
     ("rods", long_rods),
+    ("many", many_rods),
     ("parts", parts),
     ("solvers", solvers),
     ("interface", interfaces),

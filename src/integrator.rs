@@ -22,7 +22,7 @@ use crate::pose::{Row, State};
 use crate::refine::Refiner;
 use crate::rosenbrock::{RODAS4, RODAS5P};
 use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
-use crate::stepper::{Attempt, Diverged, Stepper};
+use crate::stepper::{Attempt, Diverged, Reason, Stepper};
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
@@ -81,6 +81,9 @@ const AT_REST: f64 = 1e-6;
 /// Part of the time in which gravity or stiffness move the whole rod that a step in a plane may gain as much energy as, however
 /// short it is: in a whip errors of a step are a part of its square, and shorter ones never good enough.
 const SUDDEN: f64 = 0.002;
+
+/// The same by which a step of implicit Euler, which should lose some, has gone over to another solution.
+const WILD: f64 = 0.5;
 
 /// Part of a load or an acceleration by which it may differ and has not jumped: hosts round the time.
 const JUMP: f64 = 1e-9;
@@ -201,6 +204,8 @@ enum Kind {
     Fitting,
     /// By implicit Euler and the accelerations of the positions: what cannot be followed rests, whatever the step.
     Damped,
+    /// The same, but what seems to have gained much energy is another solution than the one that follows, and not taken.
+    Falling,
     /// To the equilibrium at its end.
     Resting,
 }
@@ -577,7 +582,7 @@ impl Integrator {
             plane.look(1.0, &drive(dt));
         }
         let energy = self.energy.worked(&work).now(&plane.energy());
-        if gain(&self.energy, &energy, &work, self.large) > GAIN * self.drift * dt.max(SUDDEN * *time) {
+        if gain(&self.energy, &energy, self.large) > GAIN * self.drift * dt.max(SUDDEN * *time) {
             plane.take_back();
             plane.look(1.0, &drive(0.0));
             pace.next = dt * LOST;
@@ -631,7 +636,7 @@ impl Integrator {
                 Outcome::TooLong => {
                     self.pace.next = shortest;
                     // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
-                    while self.step(drive, Kind::Damped, time, dt, MAX_HALVINGS).is_err() {
+                    while self.step(drive, Kind::Falling, time, dt, MAX_HALVINGS).is_err() {
                         if dt == rest {
                             self.step(drive, Kind::Damped, time, dt, 0)?;
                             break;
@@ -695,7 +700,7 @@ impl Integrator {
         let Stepper { mesh, rod, .. } = &self.stepper;
         let state = self.stepper.attempted();
         let energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
-        let grows = gain(&self.energy, &energy, &work, self.large) > GAIN * drift;
+        let grows = gain(&self.energy, &energy, self.large) > GAIN * drift;
         if fits && grows {
             pace.next = dt * LOST;
         }
@@ -735,18 +740,12 @@ impl Integrator {
         let boundary = drive(time + dt).boundary;
         let report = match kind {
             Kind::Fitting => self.stepper.advance(&boundary, self.scheme, dt),
-            Kind::Damped => self.stepper.step(&boundary, Scheme::BACKWARD_EULER, dt, Row::Positions),
+            Kind::Damped | Kind::Falling => self.stepper.step(&boundary, Scheme::BACKWARD_EULER, dt, Row::Positions),
             Kind::Resting => self.stepper.drift(&boundary, dt),
         };
         match report {
             Ok(report) => {
                 self.effort.iterated(report.iterations);
-                let order = match kind {
-                    Kind::Resting => 0,
-                    _ if self.stepper.state.scheme.is_second_order() => 2,
-                    _ => 1,
-                };
-                self.effort.took(order, dt, 0.0);
                 let Stepper { mesh, rod, state, .. } = &self.stepper;
                 let before = self.stepper.previous();
                 let mean = |from: Vec3, to: Vec3| 0.5 * (from + to);
@@ -757,9 +756,22 @@ impl Integrator {
                         tip_moment: mean(before.boundary.tip_moment, boundary.tip_moment),
                         ..boundary
                     },
-                    Kind::Fitting | Kind::Damped => boundary,
+                    Kind::Fitting | Kind::Damped | Kind::Falling => boundary,
                 };
-                self.energy = self.energy.after(mesh, rod, before, state, &worked);
+                let energy = self.energy.after(mesh, rod, before, state, &worked);
+                if kind == Kind::Falling && gain(&self.energy, &energy, self.large) > WILD {
+                    self.stepper.take_back();
+                    let (iterations, residual) = (report.iterations, report.residual);
+                    let cause = Diverged { iterations, residual, reason: Reason::Elsewhere };
+                    return Err(Failed { time, step: dt, cause });
+                }
+                self.energy = energy;
+                let order = match kind {
+                    Kind::Resting => 0,
+                    _ if self.stepper.state.scheme.is_second_order() => 2,
+                    _ => 1,
+                };
+                self.effort.took(order, dt, 0.0);
                 Ok(())
             }
             Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
@@ -862,11 +874,10 @@ impl Integrator {
     }
 }
 
-/// What a step in which `work` was done has added to the energy beyond that, relative to it, or to the `large` one, J, that
+/// What a step has added to the energy beyond the work that was done in it, relative to it, or to the `large` one, J, that
 /// gravity and bending can give.
-fn gain(before: &Energy, after: &Energy, work: &Powers, large: f64) -> f64 {
-    let gained = after.total() - before.total() + work.lost - work.base - work.tip;
-    gained / (large + after.kinetic + after.elastic)
+fn gain(before: &Energy, after: &Energy, large: f64) -> f64 {
+    (after.residual(before) - before.residual(before)) / (large + after.kinetic + after.elastic)
 }
 
 /// What is kept before an interval, so that a step that fails is undone, decides all that follows: that is stored, for a

@@ -102,6 +102,8 @@ pub enum Reason {
     Singular(Singular),
     /// A number overflowed, or one that was given is not finite.
     NotFinite,
+    /// It converged to another solution than the one that follows, of much more energy.
+    Elsewhere,
     /// The formulation clamps the base, which is to hold this only.
     BaseLetGo(Held),
 }
@@ -114,6 +116,7 @@ impl fmt::Display for Diverged {
             Reason::TooManyIterations => write!(f, "too many iterations"),
             Reason::Singular(singular) => write!(f, "{singular}"),
             Reason::NotFinite => write!(f, "a number is not finite"),
+            Reason::Elsewhere => write!(f, "to a solution of much more energy only"),
             Reason::BaseLetGo(held) => write!(f, "the base is to be clamped, and holds {held:?}"),
         }
     }
@@ -298,6 +301,11 @@ impl Stepper {
     pub fn previous(&self) -> &State {
         // a step swaps the two
         &self.trial
+    }
+
+    /// Takes the last step back: the state is the one before it.
+    pub(crate) fn take_back(&mut self) {
+        std::mem::swap(&mut self.state, &mut self.trial);
     }
 
     /// One step of `dt` s to `boundary` in the way that suits it.

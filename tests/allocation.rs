@@ -154,7 +154,7 @@ fn communication_steps_allocate_nothing_whatever_becomes_of_them() {
     let (y, z) = (Vector3::y(), Vector3::z());
     type Pushes = Vec<(Inputs, usize)>;
     let drives: [(&str, Parameters, Pushes); 3] = [
-        ("whip", whip, vec![(push(z, 0.0), 40), (push(z, 1e150), 1), (push(y, 0.1), 20)]),
+        ("whip", whip, vec![(push(z, 0.0), 40), (push(z, 1e300), 1), (push(y, 0.1), 20)]),
         (
             "stiff",
             stiff,

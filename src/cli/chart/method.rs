@@ -29,6 +29,13 @@ pub enum Resolution {
     Tolerance(f64),
 }
 
+impl Resolution {
+    /// Whether its steps are longer than those of `count` to the end.
+    pub fn is_longer_than(&self, count: usize) -> bool {
+        matches!(self, Self::Grid { steps, .. } if *steps < count)
+    }
+}
+
 impl fmt::Display for Resolution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

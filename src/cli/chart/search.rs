@@ -309,6 +309,13 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
         // methods that remain share what remains
         let most = ledger.spent + (budget - ledger.spent) / (problem.methods.len() - method) as f64;
         grids(&mut ledger, method, resolutions, &reference, most);
+        // steps that no unit can take, past communication points, are not all there is to know
+        let others: Vec<_> = resolutions
+            .iter()
+            .copied()
+            .filter(|resolution| !resolution.is_longer_than(reference.tip.len() - 1))
+            .collect();
+        grids(&mut ledger, method, &others, &reference, most);
     }
 
     let mut points = Vec::new();
@@ -330,7 +337,7 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
                 Resolution::Tolerance(tolerance) => Some(*tolerance),
                 Resolution::Grid { .. } => None,
             },
-            long_steps: matches!(resolution, Resolution::Grid { steps, .. } if *steps < run.tip.len() - 1),
+            long_steps: resolution.is_longer_than(run.tip.len() - 1),
         });
     }
     let mut notes = Vec::new();
