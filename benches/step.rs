@@ -201,7 +201,7 @@ enum Whole {
 const CELL: f64 = 0.1;
 /// Its steps, s, and the stages of its cells.
 const WHOLE_STEP: f64 = 1e-3;
-const WHOLE_STAGES: usize = 2;
+const WHOLE_STAGES: usize = 4;
 
 impl Whole {
     /// A coil of rubber at rest: every stage of a step in space takes one iteration, however many the cells.
