@@ -2,8 +2,11 @@
 
 use cosserat_rod::fmi2::description;
 use cosserat_rod::fmi2::host::Fmu;
-use cosserat_rod::package;
-use std::collections::BTreeSet;
+use cosserat_rod::fmi2::variables::{self, Variable};
+use cosserat_rod::package::{self, documentation, raster, sketch, terminals};
+use quick_xml::Reader;
+use quick_xml::events::Event;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, io};
@@ -56,9 +59,19 @@ fn the_archive_is_what_the_standard_asks_for() {
     let bytes = fs::read(&archive).unwrap();
     let mut zip = ZipArchive::new(io::Cursor::new(&bytes)).unwrap();
     let names: BTreeSet<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
-    let licenses = ["APACHE", "MIT"].map(|name| format!("documentation/licenses/LICENSE-{name}.txt"));
-    let expected = ["modelDescription.xml".to_owned(), description::binary()].into_iter().chain(licenses);
-    assert_eq!(names, expected.collect());
+    let binary = description::binary(description::MODEL_IDENTIFIER);
+    let expected = [
+        "modelDescription.xml",
+        "model.png",
+        &binary,
+        "documentation/index.html",
+        "documentation/licenses/LICENSE-APACHE.txt",
+        "documentation/licenses/LICENSE-MIT.txt",
+        "documentation/licenses/THIRD-PARTY.txt",
+        "terminalsAndIcons/terminalsAndIcons.xml",
+        "extra/com.open-simulation-platform/CosseratRod_OspModelDescription.xml",
+    ];
+    assert_eq!(names, expected.map(str::to_owned).into());
     for index in 0..zip.len() {
         let file = zip.by_index(index).unwrap();
         let name = file.name().unwrap();
@@ -97,4 +110,135 @@ fn the_unpacked_archive_runs() {
 fn the_default_experiment_has_200_steps() {
     let steps = description::STOP_TIME / description::STEP_SIZE;
     assert_eq!((steps.round() as i32, (steps - steps.round()).abs() < 1e-9), (200, true));
+}
+
+/// The elements of a text that is well-formed, each with the texts of its attributes; those that only hold others too.
+fn elements(xml: &str) -> Vec<(String, BTreeMap<String, String>)> {
+    let mut reader = Reader::from_str(xml);
+    let (mut elements, mut open) = (Vec::new(), 0);
+    loop {
+        let event = reader.read_event().unwrap();
+        match &event {
+            Event::Start(element) | Event::Empty(element) => {
+                open += i32::from(matches!(event, Event::Start(_)));
+                let attributes = element.attributes().map(|attribute| attribute.unwrap());
+                let attributes = attributes.map(|one| (one.key.as_ref().to_owned(), one.value.to_string()));
+                elements.push((element.name().as_ref().to_owned(), attributes.collect()));
+            }
+            Event::End(_) => open -= 1,
+            Event::Eof => break,
+            _ => {}
+        }
+    }
+    assert_eq!(open, 0, "every element is closed");
+    elements
+}
+
+#[test]
+fn the_documentation_has_every_variable() {
+    let html = documentation::index();
+    let elements = elements(&html);
+    let count = |name: &str| elements.iter().filter(|(element, _)| element == name).count();
+    assert_eq!((count("table"), count("svg"), count("h1")), (3, 1, 1));
+    // rows below the three headers
+    assert_eq!(count("tr"), variables::ROWS.len() + 3);
+    for row in variables::ROWS {
+        let text = |text: &str| quick_xml::escape::escape(text).into_owned();
+        let cells = [row.to_string(), row.unit.to_owned()].map(|cell| format!("<td>{}</td>", text(&cell)));
+        let line = html.split("<tr>").find(|line| line.contains(&cells[0]) && line.contains(&cells[1]));
+        let line = line.unwrap_or_else(|| panic!("{row}"));
+        assert!(line.contains(&text(row.description)), "{row}");
+        let first = Variable { row, element: 0 };
+        assert!(first.is_output() || line.contains(&text(&first.allowed().to_string())), "{row}");
+    }
+    for start in ["<td>0, 0, -9.81</td>", "<td>5000000</td>", "<td>false</td>", "<td>1100</td>"] {
+        assert!(html.contains(start), "{start}");
+    }
+}
+
+#[test]
+fn the_icon_is_the_sketch() {
+    assert!(elements(&sketch::svg()).len() > 30);
+    let png = raster::png(&sketch::svg(), 1).unwrap();
+    // width and height of the header
+    assert_eq!((&png[..4], &png[16..24]), (&b"\x89PNG"[..], &[0, 0, 2, 128, 0, 0, 1, 124][..]));
+}
+
+#[test]
+fn ports_and_terminals_name_variables_with_their_units() {
+    let known: BTreeMap<String, Variable> =
+        variables::all().into_iter().map(|variable| (variable.to_string(), variable)).collect();
+    let members: Vec<_> = elements(&terminals::terminals());
+    let members: Vec<_> = members.iter().filter(|(name, _)| name == "TerminalMemberVariable").collect();
+    assert_eq!(members.len(), 2 * 19);
+    for (_, attributes) in members {
+        assert!(known.contains_key(&attributes["variableName"]), "{attributes:?}");
+    }
+    let elements = elements(&terminals::ports());
+    let references: Vec<_> = elements.iter().filter(|(name, _)| name == "Variable").collect();
+    assert_eq!(references.len(), 2 * 19);
+    for (_, attributes) in references {
+        let unit = attributes.get("unit").map_or("", String::as_str);
+        assert_eq!(known[&attributes["ref"]].row.unit, unit);
+    }
+    let names: Vec<&String> = elements.iter().filter_map(|(_, attributes)| attributes.get("name")).collect();
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len(), "names of groups are unique");
+}
+
+/// Direct dependencies that the library of the unit uses: all that its modules name but those for packaging and hosts.
+fn linked() -> BTreeSet<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).unwrap();
+    let section = manifest.split("[dependencies]\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let dependencies: Vec<&str> =
+        section.lines().filter_map(|line| line.split_once(" = ")).map(|(name, _)| name).collect();
+    let mut directories = vec![root.join("src")];
+    let mut used = BTreeSet::new();
+    while let Some(directory) = directories.pop() {
+        for path in fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()) {
+            let name = path.file_name().unwrap().to_str().unwrap();
+            if path.is_dir() && !["cli", "package"].contains(&name) {
+                directories.push(path);
+            } else if path.is_file() && !["main.rs", "host.rs"].contains(&name) {
+                let text = fs::read_to_string(&path).unwrap();
+                let named = |dependency: &&&str| text.contains(&format!("{}::", dependency.replace('-', "_")));
+                used.extend(dependencies.iter().filter(named).map(|name| (*name).to_owned()));
+            }
+        }
+    }
+    used
+}
+
+#[test]
+fn the_list_of_linked_crates_is_that_of_the_lock_file() {
+    let mut arguments: Vec<String> = [
+        "tree",
+        "--locked",
+        "--offline",
+        "--edges",
+        "normal,no-proc-macro",
+        "--prefix",
+        "none",
+        "--format",
+        "{p}: {l}",
+    ]
+    .map(str::to_owned)
+    .into();
+    let linked = linked();
+    assert!(linked.contains("nalgebra"), "{linked:?}");
+    arguments.extend(linked.into_iter().flat_map(|name| ["--package".to_owned(), name]));
+    let output = Command::new(env!("CARGO")).current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let crates: BTreeSet<String> = text
+        .lines()
+        .filter(|line| !line.is_empty())
+        .map(|line| line.replace(" (*)", "").replacen(" v", " ", 1))
+        .collect();
+    let list = include_str!("../THIRD-PARTY.txt").split("\n\n").nth(1).unwrap();
+    assert_eq!(list.lines().map(str::to_owned).collect::<BTreeSet<_>>(), crates, "what THIRD-PARTY.txt has to list");
+    // each may be used under a licence whose text is in the archive
+    for line in list.lines() {
+        assert!(["Apache-2.0", "MIT"].iter().any(|license| line.contains(license)), "{line}");
+    }
 }

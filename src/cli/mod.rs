@@ -36,10 +36,7 @@ impl fmt::Display for Error {
                 write!(f, "{name} is no parameter or input of the unit:")?;
                 let settable = variables::ROWS.iter().map(|row| Variable { row, element: 0 });
                 for (k, variable) in settable.filter(|variable| !variable.is_output()).enumerate() {
-                    write!(f, "{} {}", if k == 0 { "" } else { "," }, variable.row.name)?;
-                    if !variable.row.components.is_empty() {
-                        write!(f, "[1..{}]", variable.row.components.len())?;
-                    }
+                    write!(f, "{} {}", if k == 0 { "" } else { "," }, variable.row)?;
                 }
                 Ok(())
             }

@@ -1,13 +1,12 @@
-//! A page to draw on: SVG, and the PNG made from it with a font that comes with the program.
+//! A page to draw on: SVG, and the PNG made from it.
 
+use cosserat_rod::package::raster;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use resvg::{tiny_skia, usvg};
 use std::error::Error;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 
 /// The backend rounds to whole units of this fraction of a page unit.
 const FINE: u32 = 5;
@@ -47,8 +46,6 @@ pub fn text(area: &Area<'_>, text: &str, (x, y): (f64, f64), size: f64, color: R
 /// A drawn page.
 pub struct Page {
     svg: String,
-    width: u32,
-    height: u32,
 }
 
 impl Page {
@@ -63,26 +60,14 @@ impl Page {
         }
         // the fine units stay inside
         let size = |scale: u32| format!("width=\"{}\" height=\"{}\"", width * scale, height * scale);
-        Ok(Self { svg: svg.replacen(&size(FINE), &size(1), 1), width, height })
+        Ok(Self { svg: svg.replacen(&size(FINE), &size(1), 1) })
     }
 
     /// Writes it: as PNG where the name ends so, else as SVG.
     pub fn write(&self, path: &Path) -> Result<(), Box<dyn Error>> {
         let png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-        let bytes = if png { self.png()? } else { self.svg.clone().into_bytes() };
+        let bytes = if png { raster::png(&self.svg, PIXELS)? } else { self.svg.clone().into_bytes() };
         Ok(write(path, &bytes)?)
-    }
-
-    fn png(&self) -> Result<Vec<u8>, Box<dyn Error>> {
-        let mut options = usvg::Options::default();
-        let fonts = Arc::make_mut(&mut options.fontdb);
-        fonts.load_font_data(dejavu::sans::regular().to_vec());
-        let tree = usvg::Tree::from_str(&self.svg, &options)?;
-        let mut pixels =
-            tiny_skia::Pixmap::new(self.width * PIXELS, self.height * PIXELS).ok_or("a picture of no size")?;
-        let scale = tiny_skia::Transform::from_scale(PIXELS as f32, PIXELS as f32);
-        resvg::render(&tree, scale, &mut pixels.as_mut());
-        Ok(pixels.encode_png()?)
     }
 }
 

@@ -13,8 +13,8 @@ use std::io;
 /// Name of the library in the archive.
 pub const MODEL_IDENTIFIER: &str = "CosseratRod";
 
-/// Where in the archive the library of the platform this was compiled for lies, with forward slashes.
-pub fn binary() -> String {
+/// Where in an archive the library of a model lies for the platform this was compiled for, with forward slashes.
+pub fn binary(identifier: &str) -> String {
     let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
     let short = match os {
         "windows" => "win",
@@ -27,7 +27,7 @@ pub fn binary() -> String {
         "x86" => format!("{short}32"),
         other => format!("{other}-{short}"),
     };
-    format!("binaries/{platform}/{MODEL_IDENTIFIER}{}", std::env::consts::DLL_SUFFIX)
+    format!("binaries/{platform}/{identifier}{}", std::env::consts::DLL_SUFFIX)
 }
 
 /// End of the default experiment, s; it starts at 0.
@@ -75,16 +75,29 @@ fn fingerprint(text: &[u8]) -> u128 {
 }
 
 fn render(guid: &str) -> String {
+    document(|xml| model(xml, guid))
+}
+
+/// Where markup is written to.
+pub(crate) type Xml = Writer<Vec<u8>>;
+
+/// The text of an XML file with these contents.
+pub(crate) fn document(contents: impl FnOnce(&mut Xml) -> io::Result<()>) -> String {
+    markup(|xml| {
+        xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+        contents(xml)
+    })
+}
+
+/// The text that `contents` writes.
+pub(crate) fn markup(contents: impl FnOnce(&mut Xml) -> io::Result<()>) -> String {
     let mut writer = Writer::new_with_indent(Vec::new(), b' ', 2);
-    let written = document(&mut writer, guid);
+    let written = contents(&mut writer);
     debug_assert!(written.is_ok(), "memory takes every write");
     String::from_utf8_lossy(&writer.into_inner()).into_owned() + "\n"
 }
 
-type Xml = Writer<Vec<u8>>;
-
-fn document(xml: &mut Xml, guid: &str) -> io::Result<()> {
-    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+fn model(xml: &mut Xml, guid: &str) -> io::Result<()> {
     xml.create_element("fmiModelDescription")
         .with_attributes([
             ("fmiVersion", "2.0"),
@@ -187,13 +200,7 @@ fn scalar(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()
         None => element,
     };
     element.write_inner_content(|xml| {
-        let kind = match variable.kind() {
-            Kind::Real => "Real",
-            Kind::Integer => "Integer",
-            Kind::Boolean => "Boolean",
-            Kind::String => "String",
-        };
-        let mut element = xml.create_element(kind);
+        let mut element = xml.create_element(variable.kind().name());
         if !variable.row.unit.is_empty() {
             element = element.with_attribute(("unit", variable.row.unit));
         }
@@ -218,7 +225,7 @@ fn scalar(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()
 }
 
 /// Causality, variability and initial, as the standard allows them together.
-fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static str>) {
+pub(crate) fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static str>) {
     match row.slot {
         Slot::Parameter(..) | Slot::IntegerParameter(..) | Slot::BooleanParameter(_) => {
             ("parameter", "fixed", Some("exact"))

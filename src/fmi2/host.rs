@@ -374,7 +374,11 @@ impl Fmu {
         let path = directory.join("modelDescription.xml");
         let xml = fs::read_to_string(&path).map_err(|error| Error::Read { path, error })?;
         let resources = format!("file://{}/resources", directory.display());
-        Self::load(&directory.join(description::binary()), Description::parse(&xml)?, resources)
+        Self::load(
+            &directory.join(description::binary(description::MODEL_IDENTIFIER)),
+            Description::parse(&xml)?,
+            resources,
+        )
     }
 
     /// Loads a library that has not been packaged, with the description this crate renders.

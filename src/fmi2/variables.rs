@@ -21,6 +21,18 @@ pub enum Kind {
     String,
 }
 
+impl Kind {
+    /// Name of its element in the model description.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Real => "Real",
+            Self::Integer => "Integer",
+            Self::Boolean => "Boolean",
+            Self::String => "String",
+        }
+    }
+}
+
 /// Where a variable lives; the second argument is the element of an array, 0 for a scalar.
 #[derive(Clone, Copy, Debug)]
 pub enum Slot {
@@ -86,6 +98,17 @@ pub struct Row {
 impl Row {
     fn elements(&self) -> usize {
         self.components.len().max(1) * self.copies
+    }
+}
+
+/// Its name with the ranges of its indices: `gravity[1..3]`.
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.name.split_once("[i]") {
+            Some((before, after)) => write!(f, "{before}[1..{}]{after}", self.copies)?,
+            None => f.write_str(self.name)?,
+        }
+        if self.components.is_empty() { Ok(()) } else { write!(f, "[1..{}]", self.components.len()) }
     }
 }
 

@@ -1,4 +1,12 @@
-//! The build script of the unit: library and model description into one archive, and out of it again.
+//! The build script of the unit: library, descriptions and documentation into one archive, and out of it again.
+
+pub mod raster;
+
+pub mod sketch;
+
+pub mod terminals;
+
+pub mod documentation;
 
 use crate::fmi2::{description, host};
 use std::io::{self, Write};
@@ -17,6 +25,8 @@ pub enum Error {
     },
     /// The library cannot be loaded, or is of another version than this program.
     Library(host::Error),
+    /// The icon cannot be drawn.
+    Icon(raster::Error),
     /// A file cannot be read or written.
     File {
         /// Which.
@@ -34,6 +44,7 @@ impl fmt::Display for Error {
                 places.iter().try_for_each(|place| write!(f, " {}", place.display()))
             }
             Self::Library(error) => write!(f, "the library does not fit this program, build both again: {error}"),
+            Self::Icon(error) => write!(f, "the icon of the archive: {error}"),
             Self::File { path, error } => write!(f, "{}: {error}", path.display()),
         }
     }
@@ -76,12 +87,17 @@ pub fn package(archive: &Path) -> Result<(), Error> {
         .and_then(|fmu| fmu.instantiate("package", false).map(drop))
         .map_err(Error::Library)?;
     let code = fs::read(&library).map_err(at(&library))?;
-    let xml = description::xml();
-    let files: [(&str, &[u8]); 4] = [
-        ("modelDescription.xml", xml.as_bytes()),
-        (&description::binary(), &code),
-        ("documentation/licenses/LICENSE-APACHE.txt", include_bytes!("../LICENSE-APACHE")),
-        ("documentation/licenses/LICENSE-MIT.txt", include_bytes!("../LICENSE-MIT")),
+    let binary = description::binary(description::MODEL_IDENTIFIER);
+    let files = [
+        ("modelDescription.xml", description::xml().into_bytes()),
+        (sketch::ICON, raster::png(&sketch::svg(), 1).map_err(Error::Icon)?),
+        (binary.as_str(), code),
+        (documentation::INDEX, documentation::index().into_bytes()),
+        ("documentation/licenses/LICENSE-APACHE.txt", include_bytes!("../../LICENSE-APACHE").to_vec()),
+        ("documentation/licenses/LICENSE-MIT.txt", include_bytes!("../../LICENSE-MIT").to_vec()),
+        ("documentation/licenses/THIRD-PARTY.txt", include_bytes!("../../THIRD-PARTY.txt").to_vec()),
+        (terminals::TERMINALS, terminals::terminals().into_bytes()),
+        (terminals::PORTS, terminals::ports().into_bytes()),
     ];
     let bytes = zip(&files).map_err(at(archive))?;
     if let Some(directory) = archive.parent() {
@@ -92,7 +108,7 @@ pub fn package(archive: &Path) -> Result<(), Error> {
 
 /// Deflated, without 64-bit sizes, so that version 2.0 of the format is enough, which is all the standard allows. Every
 /// file has the same date, so that the same files give the same bytes.
-fn zip(files: &[(&str, &[u8])]) -> io::Result<Vec<u8>> {
+fn zip(files: &[(&str, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .large_file(false)

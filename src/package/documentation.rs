@@ -1,0 +1,223 @@
+//! `documentation/index.html`: what the README says of the unit, and every variable of the table.
+//!
+//! The text is that of the README, lest two accounts of the limits drift apart. Of Markdown it knows what stands there:
+//! paragraphs, lists, code and bold.
+
+use super::sketch;
+use crate::fmi2::description::{self, Xml, markup, triple};
+use crate::fmi2::variables::{Kind, ROWS, Row, Variable};
+use crate::unit::{Inputs, Parameters};
+use quick_xml::events::{BytesText, Event};
+use std::io;
+
+/// Where in the archive it lies.
+pub const INDEX: &str = "documentation/index.html";
+
+const README: &str = include_str!("../../README.md");
+
+/// Parts of the README and what they are called here.
+const SECTIONS: [(&str, &str); 3] =
+    [("Variables", "Conventions"), ("Limits", "Limits"), ("How it works", "How it works")];
+
+const STYLE: &str = "body { font: 15px/1.45 sans-serif; max-width: 62em; margin: 2em auto; padding: 0 1em; color: #282c34 } \
+    table { border-collapse: collapse; width: 100% } svg { max-width: 100%; height: auto } \
+    th, td { text-align: left; vertical-align: top; padding: 0.25em 0.9em 0.25em 0; border-bottom: 1px solid #cdd1d8 } \
+    code, td:first-child { font-family: monospace }";
+
+/// A paragraph, or an item of a list, with its markup.
+#[derive(Debug, PartialEq)]
+enum Block {
+    Paragraph(String),
+    Item(String),
+}
+
+/// The paragraphs and lists of a text; tables, pictures and code are left out.
+fn blocks(text: &str) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    let mut open: Option<Block> = None;
+    let mut fenced = false;
+    for line in text.lines() {
+        let fence = line.starts_with("```");
+        fenced ^= fence;
+        if fence || fenced || line.is_empty() || line.starts_with('|') || line.starts_with("![") {
+            blocks.extend(open.take());
+            continue;
+        }
+        match (line.strip_prefix("- "), &mut open) {
+            (Some(item), _) => blocks.extend(open.replace(Block::Item(item.to_owned()))),
+            (None, Some(Block::Paragraph(text) | Block::Item(text))) => {
+                text.push(' ');
+                text.push_str(line.trim());
+            }
+            (None, None) => open = Some(Block::Paragraph(line.to_owned())),
+        }
+    }
+    blocks.extend(open);
+    blocks
+}
+
+/// What stands under a heading of the README; under its title for an empty name.
+fn section(name: &str) -> &'static str {
+    let (title, rest) = README.split_once("\n\n").unwrap_or_default();
+    debug_assert!(title.starts_with("# "), "the README begins with its title");
+    let found =
+        if name.is_empty() { Some(rest) } else { rest.split_once(&format!("\n## {name}\n")).map(|(_, found)| found) };
+    let found = found.unwrap_or_default();
+    found.split_once("\n## ").map_or(found, |(found, _)| found)
+}
+
+/// The whole page.
+pub fn index() -> String {
+    markup(|xml| {
+        xml.write_event(Event::DocType(BytesText::new("html")))?;
+        xml.create_element("html")
+            .with_attributes([("lang", "en"), ("xmlns", "http://www.w3.org/1999/xhtml")])
+            .write_inner_content(|xml| {
+                xml.create_element("head").write_inner_content(|xml| {
+                    xml.create_element("meta").with_attribute(("charset", "utf-8")).write_empty()?;
+                    text(xml, "title", description::MODEL_IDENTIFIER)?;
+                    text(xml, "style", STYLE)
+                })?;
+                xml.create_element("body").write_inner_content(body)?;
+                Ok(())
+            })?;
+        Ok(())
+    })
+}
+
+fn body(xml: &mut Xml) -> io::Result<()> {
+    text(xml, "h1", description::MODEL_IDENTIFIER)?;
+    let version =
+        concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"), ", licence ", env!("CARGO_PKG_LICENSE"));
+    text(xml, "p", version)?;
+    // up to the picture
+    for block in blocks(section("")).iter().take(1) {
+        flow(xml, block)?;
+    }
+    sketch::draw(xml)?;
+    for (name, title) in SECTIONS {
+        text(xml, "h2", title)?;
+        let blocks = blocks(section(name));
+        for run in blocks.chunk_by(|a, b| matches!((a, b), (Block::Item(_), Block::Item(_)))) {
+            match run {
+                [Block::Item(_), ..] => {
+                    xml.create_element("ul")
+                        .write_inner_content(|xml| run.iter().try_for_each(|item| flow(xml, item)))?;
+                }
+                _ => run.iter().try_for_each(|block| flow(xml, block))?,
+            }
+        }
+    }
+    for (causality, title) in [("input", "Inputs"), ("output", "Outputs"), ("parameter", "Parameters")] {
+        text(xml, "h2", title)?;
+        table(xml, causality)?;
+    }
+    Ok(())
+}
+
+fn text(xml: &mut Xml, element: &str, text: &str) -> io::Result<()> {
+    xml.create_element(element).write_text_content(BytesText::new(text))?;
+    Ok(())
+}
+
+/// A block with its code and its bold words.
+fn flow(xml: &mut Xml, block: &Block) -> io::Result<()> {
+    let (element, content) = match block {
+        Block::Paragraph(text) => ("p", text),
+        Block::Item(text) => ("li", text),
+    };
+    xml.create_element(element).write_inner_content(|xml| {
+        for (k, part) in content.split('`').enumerate() {
+            if k % 2 == 1 {
+                text(xml, "code", part)?;
+                continue;
+            }
+            for (k, words) in part.split("**").enumerate() {
+                match k % 2 {
+                    1 => text(xml, "strong", words)?,
+                    _ => xml.write_event(Event::Text(BytesText::new(words)))?,
+                }
+            }
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn table(xml: &mut Xml, causality: &str) -> io::Result<()> {
+    let given = causality != "output";
+    let mut columns = vec!["name", "unit", "type"];
+    if given {
+        columns.extend(["start", "allowed"]);
+    }
+    columns.push("meaning");
+    xml.create_element("table").write_inner_content(|xml| {
+        line(xml, "th", &columns)?;
+        for row in ROWS.iter().filter(|row| triple(row).0 == causality) {
+            let first = Variable { row, element: 0 };
+            let kind = format!("{}, {}", first.kind().name(), triple(row).1);
+            let (name, start, allowed) = (row.to_string(), start(row), first.allowed().to_string());
+            let mut cells = vec![name.as_str(), row.unit, &kind];
+            if given {
+                cells.extend([start.as_str(), &allowed]);
+            }
+            let meaning = match row.components {
+                [] => row.description.to_owned(),
+                names => format!("{}: {}", row.description, names.join(", ")),
+            };
+            cells.push(&meaning);
+            line(xml, "td", &cells)?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn line(xml: &mut Xml, element: &str, cells: &[&str]) -> io::Result<()> {
+    xml.create_element("tr").write_inner_content(|xml| cells.iter().try_for_each(|cell| text(xml, element, cell)))?;
+    Ok(())
+}
+
+/// The start values of the elements, once if they are all the same.
+fn start(row: &'static Row) -> String {
+    let (mut parameters, mut inputs) = (Parameters::default(), Inputs::default());
+    let elements = (0..row.components.len().max(1)).map(|element| Variable { row, element });
+    let mut values: Vec<String> = elements
+        .filter_map(|variable| {
+            let value = variable.given(&mut parameters, &mut inputs)?;
+            Some(match variable.kind() {
+                Kind::Boolean => (value != 0.0).to_string(),
+                _ => value.to_string(),
+            })
+        })
+        .collect();
+    if values.iter().all(|value| *value == values[0]) {
+        values.truncate(1);
+    }
+    values.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_readme_has_the_sections_and_only_known_markup() {
+        for name in [""].into_iter().chain(SECTIONS.map(|(name, _)| name)) {
+            let blocks = blocks(section(name));
+            assert!(!blocks.is_empty(), "{name}");
+            for Block::Paragraph(text) | Block::Item(text) in &blocks {
+                let even = |mark: &str| text.matches(mark).count() % 2 == 0;
+                assert!(name.is_empty() || even("`") && even("**") && !text.contains("]("), "{name}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_are_paragraphs_and_items() {
+        let paragraph = |text: &str| Block::Paragraph(text.to_owned());
+        let item = |text: &str| Block::Item(text.to_owned());
+        let text = "one\nline\n\n| a |\n|---|\n- first\n  goes on\n- second\n\n```\ncode\n```\nlast\n";
+        assert_eq!(blocks(text), [paragraph("one line"), item("first goes on"), item("second"), paragraph("last")]);
+    }
+}
