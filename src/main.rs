@@ -25,6 +25,10 @@ enum Command {
         #[arg(short, long, default_value = "target/CosseratRod.fmu")]
         output: PathBuf,
     },
+    /// Tells what is in an FMU: model, platforms, capabilities, parameters.
+    Info(cli::info::Arguments),
+    /// Checks an FMU of FMI 2.0 co-simulation: its archive, its description, and its library by one step.
+    Check(cli::check::Arguments),
     /// Packages the unit, shakes it through its C interface, and draws what it did.
     Demo(cli::demo::Arguments),
     /// Runs the rod: a CSV of inputs in, a CSV of outputs out.
@@ -54,6 +58,8 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
             println!("{}", output.display());
             Ok(())
         }
+        Command::Info(arguments) => cli::info::run(&arguments),
+        Command::Check(arguments) => cli::check::run(&arguments),
         Command::Demo(arguments) => cli::demo::run(&arguments),
         Command::Simulate(arguments) => cli::simulate::run(&arguments),
         Command::Modes(arguments) => cli::modes::run(&arguments),

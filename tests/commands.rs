@@ -1,10 +1,15 @@
 //! The commands, as one types them.
 
-use cosserat_rod::fmi2::description::{STEP_SIZE, STOP_TIME};
+use cosserat_rod::fmi2::description::{MODEL_IDENTIFIER, STEP_SIZE, STOP_TIME, binary, guid};
+use cosserat_rod::package;
+use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::{fs, io};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// An empty directory of this test.
 fn directory(test: &str) -> PathBuf {
@@ -349,5 +354,120 @@ fn chart_says_what_is_wrong() {
     for (arguments, expected) in cases {
         let error = refusal(&directory, &[&["chart"][..], arguments].concat());
         assert!(error.starts_with(&format!("cosserat: {expected}")), "{error}");
+    }
+}
+
+/// Files by their names in an archive.
+type Files = BTreeMap<String, Vec<u8>>;
+
+fn unzipped(archive: &Path) -> Files {
+    let mut zip = ZipArchive::new(fs::File::open(archive).unwrap()).unwrap();
+    let mut files = Files::new();
+    for index in 0..zip.len() {
+        let mut file = zip.by_index(index).unwrap();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        files.insert(file.name().unwrap().into_owned(), bytes);
+    }
+    files
+}
+
+fn zipped(files: &Files, archive: &Path) {
+    let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+    let mut writer = ZipWriter::new(fs::File::create(archive).unwrap());
+    for (name, content) in files {
+        writer.start_file(name.as_str(), options).unwrap();
+        writer.write_all(content).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+const XML: &str = "modelDescription.xml";
+
+#[test]
+fn info_tells_what_is_in_the_archive() {
+    let directory = directory("info");
+    package::package(&directory.join("rod.fmu")).unwrap();
+    let text = cosserat(&directory, &["info", "rod.fmu"]);
+    let platform = binary(MODEL_IDENTIFIER).split('/').nth(1).unwrap().to_owned();
+    let able = "canGetAndSetFMUstate, canHandleVariableCommunicationStepSize";
+    let version = format!("cosserat-rod {}", env!("CARGO_PKG_VERSION"));
+    for words in ["CosseratRod", "2.0", &guid(), &version, &platform, able, "19 inputs", "documentation/index.html"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let row = |name: &str| -> Vec<String> {
+        let line = text.lines().find(|line| line.starts_with(&format!("{name} "))).unwrap();
+        line.split_whitespace().map(str::to_owned).collect()
+    };
+    assert_eq!(row("radius"), ["radius", "0.005", "m"]);
+    assert_eq!(row("gravity[3]"), ["gravity[3]", "-9.81", "m/s2"]);
+    assert_eq!(row("planar"), ["planar", "true"]);
+    assert!(refusal(&directory, &["info", "none.fmu"]).starts_with("cosserat: none.fmu: "));
+}
+
+#[test]
+fn check_passes_what_is_packaged_and_names_what_is_wrong() {
+    let directory = directory("check");
+    let archive = directory.join("rod.fmu");
+    package::package(&archive).unwrap();
+    let text = cosserat(&directory, &["check", "rod.fmu"]);
+    assert!(text.lines().count() == 13 && text.lines().all(|line| line.starts_with("ok  ")), "{text}");
+
+    let files = unzipped(&archive);
+    let check = |name: &str, change: &dyn Fn(&mut Files), expected: &str| {
+        let mut files = files.clone();
+        change(&mut files);
+        zipped(&files, &directory.join(name));
+        let error = refusal(&directory, &["check", name]);
+        assert!(error.starts_with(&format!("cosserat: {name}: {expected}")), "{error}");
+        fs::remove_file(directory.join(name)).unwrap();
+    };
+    let edited = |from: &str, to: &str| {
+        let xml = String::from_utf8(files[XML].clone()).unwrap();
+        assert!(xml.contains(from), "{from}");
+        xml.replacen(from, to, 1).into_bytes()
+    };
+    let edit = |name: &str, from: &str, to: &str, expected: &str| {
+        let xml = edited(from, to);
+        check(name, &|files| drop(files.insert(XML.to_owned(), xml.clone())), expected);
+    };
+    let library = binary(MODEL_IDENTIFIER);
+    let missing = format!("binary: no {library} in the archive, which is for none64");
+    check("no_xml.fmu", &|files| drop(files.remove(XML)), "description: no modelDescription.xml in the archive");
+    let elsewhere = |files: &mut Files| {
+        let library = files.remove(&library).unwrap();
+        files.insert("binaries/none64/CosseratRod.so".to_owned(), library);
+    };
+    check("no_binary.fmu", &elsewhere, &missing);
+    check(
+        "no_library.fmu",
+        &|files| drop(files.insert(library.clone(), b"text".to_vec())),
+        &format!("library: {library}: "),
+    );
+    edit("guid.fmu", &guid(), "{1}", "instance: fmi2Instantiate gave no instance; ");
+    edit("version.fmu", "fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"", "description: of FMI 3.0, not 2.0");
+    edit("exchange.fmu", "<CoSimulation ", "<ModelExchange ", "description: no co-simulation");
+    edit("short.fmu", "</fmiModelDescription>", "", "description: the model description ends before its elements do");
+    edit("names.fmu", "name=\"radius\"", "name=\"length\"", "names: two variables length");
+    edit("shared.fmu", "valueReference=\"1\"", "valueReference=\"0\"", "references: length and radius share 0");
+    edit(
+        "number.fmu",
+        "valueReference=\"1\"",
+        "valueReference=\"one\"",
+        "description: model description: valueReference = ",
+    );
+    edit("start.fmu", " start=\"1100\"", "", "start values: density has none");
+    let outputs = String::from_utf8(files[XML].clone()).unwrap();
+    let first = outputs.split_once("<Outputs>").unwrap().1.trim_start().split_once('\n').unwrap().0;
+    edit("unlisted.fmu", first, "", "outputs: ModelStructure does not list tip.position[1]");
+    edit("twice.fmu", first, &first.repeat(2), "outputs: ModelStructure lists tip.position[1] twice");
+    edit("input.fmu", first, "<Unknown index=\"1\"/>", "outputs: ModelStructure lists length, which is no output");
+
+    let bytes = fs::read(&archive).unwrap();
+    fs::write(directory.join("half.fmu"), &bytes[..bytes.len() / 2]).unwrap();
+    for command in ["check", "info"] {
+        let error = refusal(&directory, &[command, "half.fmu"]);
+        assert!(error.starts_with("cosserat: half.fmu: ") && error.contains("Zip"), "{error}");
+        assert!(refusal(&directory, &[command, "none.fmu"]).starts_with("cosserat: none.fmu: "));
     }
 }

@@ -1,7 +1,9 @@
 //! The sub-commands, one file or folder each, and what they share. Only the program carries them, not the unit.
 
 pub mod chart;
+pub mod check;
 pub mod demo;
+pub mod info;
 pub mod modes;
 mod page;
 mod picture;

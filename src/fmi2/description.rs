@@ -10,6 +10,9 @@ use quick_xml::events::{BytesDecl, Event};
 use quick_xml::writer::ElementWriter;
 use std::io;
 
+/// Where in an archive the model description lies.
+pub const FILE: &str = "modelDescription.xml";
+
 /// Name of the library in the archive.
 pub const MODEL_IDENTIFIER: &str = "CosseratRod";
 

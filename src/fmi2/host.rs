@@ -1,5 +1,5 @@
 //! The other side of the C boundary: loads an unpacked unit and drives it through its C functions only, as a master
-//! does that knows nothing but the model description. For the demo, the tests and the benchmarks.
+//! does that knows nothing but the model description. For the commands, the tests and the benchmarks.
 //!
 //! `unsafe` here is what it is for every host: the library is trusted to be what it claims. It shares the C types with
 //! `abi`, as two programs share the headers, and nothing else.
@@ -17,6 +17,7 @@ use quick_xml::{Reader, XmlVersion};
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::{Mutex, PoisonError};
 use std::{fmt, fs, io, ptr};
 
@@ -165,6 +166,15 @@ pub enum Error {
     },
     /// The model description is no XML.
     Xml(quick_xml::Error),
+    /// The model description ends before its elements do.
+    Truncated,
+    /// An attribute of the model description is no number.
+    NotANumber {
+        /// Its name.
+        attribute: &'static str,
+        /// Its value, empty where it is missing.
+        value: String,
+    },
     /// The library cannot be loaded.
     Load {
         /// Of the library.
@@ -214,8 +224,16 @@ impl fmt::Display for Error {
         match self {
             Self::Read { path, error } => write!(f, "{}: {error}", path.display()),
             Self::Xml(error) => write!(f, "model description: {error}"),
-            Self::Load { path, error } => write!(f, "{}: {error}", path.display()),
-            Self::Symbol { name, error } => write!(f, "{name}: {error}"),
+            Self::Truncated => write!(f, "the model description ends before its elements do"),
+            Self::NotANumber { attribute, value } => {
+                write!(f, "model description: {attribute} = \"{value}\" is no such number")
+            }
+            Self::Load { path, error } => match reason(error) {
+                // most systems name the file themselves
+                text if text.contains(&*path.to_string_lossy()) => f.write_str(&text),
+                text => write!(f, "{}: {text}", path.display()),
+            },
+            Self::Symbol { name, error } => write!(f, "{name}: {}", reason(error)),
             Self::NoInstance { log } => {
                 write!(f, "fmi2Instantiate gave no instance")?;
                 lines(f, log)
@@ -231,6 +249,11 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// What the system says; the error itself only says what was tried.
+fn reason(error: &libloading::Error) -> String {
+    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+}
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -262,68 +285,136 @@ pub struct Variable {
     pub unit: String,
 }
 
-/// The model description, as far as a master has to know it.
+/// The model description, as far as a master has to know it. What the file does not say is empty, or 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Description {
+    /// Version of the standard.
+    pub fmi_version: String,
+    /// Name of the model.
+    pub model_name: String,
     /// GUID.
     pub guid: String,
+    /// What made it.
+    pub generation_tool: String,
+    /// Attributes of the element `CoSimulation`: the model identifier and the capabilities. Empty for a unit that is none.
+    pub co_simulation: BTreeMap<String, String>,
+    /// Start of the default experiment, s.
+    pub start_time: f64,
     /// End of the default experiment, s.
     pub stop_time: f64,
     /// Communication step of the default experiment, s.
     pub step_size: f64,
     /// Variables by name.
     pub variables: BTreeMap<String, Variable>,
+    /// Their names as they stand in the file, where one may stand twice.
+    pub order: Vec<String>,
+    /// The outputs of the model structure: places in `order`, from 1.
+    pub outputs: Vec<usize>,
 }
 
 impl Description {
-    /// Reads the text of a `modelDescription.xml`.
+    /// Reads the text of a `modelDescription.xml`. Enumerations are read as what their C functions take them for, integers.
     ///
     /// # Errors
-    /// [`Error::Xml`]
+    /// [`Error::Xml`], [`Error::Truncated`], [`Error::NotANumber`]
     pub fn parse(xml: &str) -> Result<Self, Error> {
         let mut reader = Reader::from_str(xml);
         let mut description = Self::default();
+        let mut path: Vec<String> = Vec::new();
         let mut open: Option<(String, Variable)> = None;
         loop {
-            let element = match reader.read_event().map_err(Error::Xml)? {
+            let event = reader.read_event().map_err(Error::Xml)?;
+            let element = match &event {
                 Event::Start(element) | Event::Empty(element) => element,
-                Event::Eof => return Ok(description),
+                Event::End(_) => {
+                    path.pop();
+                    continue;
+                }
+                Event::Eof if path.is_empty() => return Ok(description),
+                Event::Eof => return Err(Error::Truncated),
                 _ => continue,
             };
-            let get = |name| attribute(&element, name);
-            let number = |name| get(name).map(|text| text.parse().unwrap_or_default());
-            let kind = match element.name().as_ref() {
-                "fmiModelDescription" => {
-                    description.guid = get("guid")?;
-                    continue;
-                }
-                "DefaultExperiment" => {
-                    (description.stop_time, description.step_size) = (number("stopTime")?, number("stepSize")?);
-                    continue;
-                }
-                "ScalarVariable" => {
-                    let variable = Variable {
-                        reference: get("valueReference")?.parse().unwrap_or_default(),
-                        kind: Kind::Real,
-                        causality: get("causality")?,
-                        variability: get("variability")?,
-                        start: String::new(),
-                        unit: String::new(),
-                    };
-                    open = Some((get("name")?, variable));
-                    continue;
-                }
-                "Real" => Kind::Real,
-                "Integer" => Kind::Integer,
-                "Boolean" => Kind::Boolean,
-                "String" => Kind::String,
-                _ => continue,
-            };
-            if let Some((name, variable)) = open.take() {
-                let variable = Variable { kind, start: get("start")?, unit: get("unit")?, ..variable };
-                description.variables.insert(name, variable);
+            description.take(element, path.last().map_or("", String::as_str), &mut open)?;
+            if let Event::Start(element) = &event {
+                path.push(element.name().as_ref().to_owned());
             }
         }
+    }
+
+    /// Takes what an element says; `open` is the variable whose type comes next.
+    fn take(
+        &mut self,
+        element: &BytesStart<'_>,
+        parent: &str,
+        open: &mut Option<(String, Variable)>,
+    ) -> Result<(), Error> {
+        let get = |name| attribute(element, name);
+        let time = |name| match get(name)? {
+            text if text.is_empty() => Ok(0.0),
+            text => number(name, text),
+        };
+        let kind = match element.name().as_ref() {
+            "fmiModelDescription" => {
+                self.fmi_version = get("fmiVersion")?;
+                self.model_name = get("modelName")?;
+                self.guid = get("guid")?;
+                self.generation_tool = get("generationTool")?;
+                return Ok(());
+            }
+            "CoSimulation" => {
+                for found in element.attributes() {
+                    let found = found.map_err(|error| Error::Xml(error.into()))?;
+                    let name = found.key.as_ref().to_owned();
+                    let value = attribute(element, &name)?;
+                    self.co_simulation.insert(name, value);
+                }
+                return Ok(());
+            }
+            "DefaultExperiment" => {
+                self.start_time = time("startTime")?;
+                self.stop_time = time("stopTime")?;
+                self.step_size = time("stepSize")?;
+                return Ok(());
+            }
+            "Unknown" if parent == "Outputs" => {
+                self.outputs.push(number("index", get("index")?)?);
+                return Ok(());
+            }
+            "ScalarVariable" => {
+                let variable = Variable {
+                    reference: number("valueReference", get("valueReference")?)?,
+                    kind: Kind::Real,
+                    causality: get("causality")?,
+                    variability: get("variability")?,
+                    start: String::new(),
+                    unit: String::new(),
+                };
+                let name = get("name")?;
+                self.order.push(name.clone());
+                *open = Some((name, variable));
+                return Ok(());
+            }
+            "Real" => Kind::Real,
+            "Integer" | "Enumeration" => Kind::Integer,
+            "Boolean" => Kind::Boolean,
+            "String" => Kind::String,
+            _ => return Ok(()),
+        };
+        if let Some((name, variable)) = open.take() {
+            let variable = Variable { kind, start: get("start")?, unit: get("unit")?, ..variable };
+            self.variables.insert(name, variable);
+        }
+        Ok(())
+    }
+
+    /// The value of an attribute of the element `CoSimulation`.
+    pub fn capability(&self, name: &str) -> &str {
+        self.co_simulation.get(name).map_or("", String::as_str)
+    }
+
+    /// Where in the archive its library for this platform lies.
+    pub fn binary(&self) -> String {
+        description::binary(self.capability("modelIdentifier"))
     }
 
     /// The value reference of a variable of this type.
@@ -346,6 +437,10 @@ impl Description {
         }
         Ok(references)
     }
+}
+
+fn number<T: FromStr>(attribute: &'static str, value: String) -> Result<T, Error> {
+    value.trim().parse().map_err(|_| Error::NotANumber { attribute, value })
 }
 
 fn attribute(element: &BytesStart<'_>, name: &str) -> Result<String, Error> {
@@ -371,14 +466,11 @@ impl Fmu {
     /// # Errors
     /// What of it cannot be read or loaded.
     pub fn open(directory: &Path) -> Result<Self, Error> {
-        let path = directory.join("modelDescription.xml");
+        let path = directory.join(description::FILE);
         let xml = fs::read_to_string(&path).map_err(|error| Error::Read { path, error })?;
+        let description = Description::parse(&xml)?;
         let resources = format!("file://{}/resources", directory.display());
-        Self::load(
-            &directory.join(description::binary(description::MODEL_IDENTIFIER)),
-            Description::parse(&xml)?,
-            resources,
-        )
+        Self::load(&directory.join(description.binary()), description, resources)
     }
 
     /// Loads a library that has not been packaged, with the description this crate renders.
@@ -400,6 +492,11 @@ impl Fmu {
         &self.functions
     }
 
+    /// The version of the standard that the library says it follows.
+    pub fn version(&self) -> String {
+        text(unsafe { (self.functions.GetVersion)() })
+    }
+
     /// A new instance; `debug` as `loggingOn`.
     ///
     /// # Errors
@@ -415,7 +512,12 @@ impl Fmu {
     pub fn instantiate_as(&self, name: &str, guid: &str, debug: bool) -> Result<Slave<'_>, Error> {
         let log = Log::default();
         // On the stack, as the standard lends it for the time of the call only.
-        let callbacks = log.callbacks();
+        let mut callbacks = log.callbacks();
+        // older units need them, and a unit that does not must not miss them
+        if self.description.capability("canNotUseMemoryManagementFunctions") != "true" {
+            callbacks.allocateMemory = Some(calloc);
+            callbacks.freeMemory = Some(free);
+        }
         let [name, guid, resources] = [name, guid, &self.resources].map(|text| CString::new(text).unwrap_or_default());
         let component = unsafe {
             (self.functions.Instantiate)(
@@ -433,6 +535,16 @@ impl Fmu {
         }
         Ok(Slave { functions: &self.functions, component, log })
     }
+}
+
+unsafe extern "C" {
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(memory: *mut c_void);
+}
+
+/// A string of a unit, empty for null.
+fn text(string: fmi2String) -> String {
+    if string.is_null() { String::new() } else { unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned() }
 }
 
 /// Collects log lines. It stays where it is, for the unit holds its address.
@@ -468,7 +580,6 @@ fn logger() -> fmi2CallbackLogger {
         category: fmi2String,
         message: fmi2String,
     ) {
-        let text = |string| unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned();
         let line = Line { instance: text(instance), status, category: text(category), text: text(message) };
         let log = unsafe { &*environment.cast::<Mutex<Vec<Line>>>() };
         log.lock().unwrap_or_else(PoisonError::into_inner).push(line);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! host =C=> abi -> instance -> {saved, variables} -> unit
-//! description -> variables          host: the other side of the C boundary, for the demo, the tests and the benchmarks
+//! description -> variables          host: the other side of the C boundary, for the commands, tests, benchmarks
 //! ```
 
 pub mod variables;

@@ -12,6 +12,7 @@ use crate::fmi2::{description, host};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::{env, fmt, fs};
+use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -27,6 +28,13 @@ pub enum Error {
     Library(host::Error),
     /// The icon cannot be drawn.
     Icon(raster::Error),
+    /// An archive has no file of this name.
+    Missing {
+        /// The archive.
+        archive: PathBuf,
+        /// The file.
+        name: String,
+    },
     /// A file cannot be read or written.
     File {
         /// Which.
@@ -45,6 +53,7 @@ impl fmt::Display for Error {
             }
             Self::Library(error) => write!(f, "the library does not fit this program, build both again: {error}"),
             Self::Icon(error) => write!(f, "the icon of the archive: {error}"),
+            Self::Missing { archive, name } => write!(f, "{}: no {name} in the archive", archive.display()),
             Self::File { path, error } => write!(f, "{}: {error}", path.display()),
         }
     }
@@ -89,7 +98,7 @@ pub fn package(archive: &Path) -> Result<(), Error> {
     let code = fs::read(&library).map_err(at(&library))?;
     let binary = description::binary(description::MODEL_IDENTIFIER);
     let files = [
-        ("modelDescription.xml", description::xml().into_bytes()),
+        (description::FILE, description::xml().into_bytes()),
         (sketch::ICON, raster::png(&sketch::svg(), 1).map_err(Error::Icon)?),
         (binary.as_str(), code),
         (documentation::INDEX, documentation::index().into_bytes()),
@@ -121,11 +130,41 @@ fn zip(files: &[(&str, Vec<u8>)]) -> io::Result<Vec<u8>> {
     Ok(writer.finish()?.into_inner())
 }
 
+fn open(archive: &Path) -> Result<ZipArchive<fs::File>, Error> {
+    let file = fs::File::open(archive).map_err(at(archive))?;
+    ZipArchive::new(file).map_err(|error| at(archive)(error.into()))
+}
+
 /// Unpacks an archive into a directory, which is made where it is missing.
 ///
 /// # Errors
 /// [`Error::File`]
 pub fn unpack(archive: &Path, directory: &Path) -> Result<(), Error> {
-    let file = fs::File::open(archive).map_err(at(archive))?;
-    ZipArchive::new(file).and_then(|mut zip| zip.extract(directory)).map_err(|error| at(archive)(error.into()))
+    open(archive)?.extract(directory).map_err(|error| at(archive)(error.into()))
+}
+
+/// The names of the files in an archive.
+///
+/// # Errors
+/// [`Error::File`]
+pub fn names(archive: &Path) -> Result<Vec<String>, Error> {
+    let zip = open(archive)?;
+    let names: Result<Vec<String>, _> = zip.file_names().map(|name| name.map(|name| name.into_owned())).collect();
+    let mut names = names.map_err(|error| at(archive)(io::Error::other(error)))?;
+    // those that end so are folders
+    names.retain(|name| !name.ends_with('/'));
+    Ok(names)
+}
+
+/// A text in an archive.
+///
+/// # Errors
+/// [`Error::Missing`], [`Error::File`]
+pub fn read(archive: &Path, name: &str) -> Result<String, Error> {
+    let mut zip = open(archive)?;
+    match zip.by_name(name) {
+        Ok(file) => io::read_to_string(file).map_err(at(&archive.join(name))),
+        Err(ZipError::FileNotFound) => Err(Error::Missing { archive: archive.to_owned(), name: name.to_owned() }),
+        Err(error) => Err(at(archive)(error.into())),
+    }
 }
