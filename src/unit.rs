@@ -195,6 +195,10 @@ pub struct Outputs {
     pub stations: [Vector3<f64>; STATIONS],
     /// Energies and works.
     pub energy: Energy,
+    /// Rate of `energy.work_base`: what the base does on the rod, W.
+    pub power_base: f64,
+    /// Rate of `energy.work_tip`, under the load of the step that ends here, W.
+    pub power_tip: f64,
     /// Cells in use.
     pub cells: i32,
     /// What it took since the start.
@@ -210,6 +214,8 @@ archived!(Outputs {
     base_reaction_moment,
     stations,
     energy,
+    power_base,
+    power_tip,
     cells,
     solver
 });
@@ -655,7 +661,7 @@ impl Unit {
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
         let start = Start { parameters: parameters.clone(), inputs: inputs.clone(), tolerance };
         let mut unit = Self::of(start, Parameters::start)?;
-        unit.read_out();
+        unit.read_out(inputs);
         Ok(unit)
     }
 
@@ -731,7 +737,7 @@ impl Unit {
         })?;
         let warning = self.disagreement(&segment, step_size);
         self.path = segment.into_path();
-        self.read_out();
+        self.read_out(inputs);
         Ok(warning)
     }
 
@@ -777,8 +783,8 @@ impl Unit {
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
-    fn read_out(&mut self) {
-        let integrator = &self.integrator;
+    fn read_out(&mut self, inputs: &Inputs) {
+        let (integrator, base) = (&self.integrator, self.path.base());
         let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
         self.outputs = Outputs {
             tip_position: position,
@@ -788,6 +794,8 @@ impl Unit {
             base_reaction_force: force,
             base_reaction_moment: moment,
             energy: *integrator.energy(),
+            power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
+            power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
             ..self.outputs

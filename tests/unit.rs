@@ -446,3 +446,29 @@ fn a_rod_moved_slowly_through_a_limit_point_is_refused_and_goes_back() {
         }
     }
 }
+
+#[test]
+fn the_powers_are_the_rates_of_the_works() {
+    let h = 1e-3;
+    let inputs = |t: f64| Inputs {
+        base_position: Vec3::new(0.0, 0.02 * (1.0 - (6.0 * t).cos()), 0.0),
+        base_velocity: Vec3::new(0.0, 0.12 * (6.0 * t).sin(), 0.0),
+        tip_force: Vec3::new(0.0, 0.05, 0.02),
+        tip_moment: Vec3::new(1e-3, 0.0, 0.0),
+        ..Inputs::default()
+    };
+    let parameters = Parameters { start_in_equilibrium: true, ..Parameters::default() };
+    let mut unit = Unit::new(&parameters, &inputs(0.0), Some(1e-5)).unwrap();
+    let (mut base, mut tip, mut largest) = (0.0, 0.0, [0.0f64; 2]);
+    for i in 0..300 {
+        let before = unit.outputs().clone();
+        unit.advance(&inputs(f64::from(i) * h), h).unwrap();
+        let now = unit.outputs();
+        base += 0.5 * h * (before.power_base + now.power_base);
+        tip += 0.5 * h * (before.power_tip + now.power_tip);
+        largest = [largest[0].max(now.energy.work_base.abs()), largest[1].max(now.energy.work_tip.abs())];
+    }
+    let energy = unit.outputs().energy;
+    assert!((base - energy.work_base).abs() < 1e-2 * largest[0], "{base} {energy:?}");
+    assert!((tip - energy.work_tip).abs() < 1e-2 * largest[1], "{tip} {energy:?}");
+}

@@ -352,6 +352,10 @@ pub static ROWS: &[Row] = &[
         "Work the base has done on the rod since the start"),
     scalar("energy.work_tip", "J", Output(|o, _| o.energy.work_tip, Initially::Constant),
         "Work the tip force and moment have done on the rod since the start"),
+    scalar("coupling.power_base", "W", Output(|o, _| o.power_base, START),
+        "Power that the base puts into the rod, the rate of energy.work_base"),
+    scalar("coupling.power_tip", "W", Output(|o, _| o.power_tip, START),
+        "Power that the tip force and moment of the step that ends here put into the rod, the rate of energy.work_tip"),
     scalar("solver.steps", "", IntegerOutput(|o| o.solver.steps, Initially::Constant),
         "Internal steps since the start"),
     scalar("solver.iterations", "", IntegerOutput(|o| o.solver.iterations, START),
@@ -389,6 +393,7 @@ pub const UNITS: &[(&str, [i32; 4])] = &[
     ("N.m",    [1, 2, -2, 0]),
     ("N.s/m2", [1, -1, -1, 0]),
     ("J",      [1, 2, -2, 0]),
+    ("W",      [1, 2, -3, 0]),
 ];
 
 #[cfg(test)]
