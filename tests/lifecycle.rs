@@ -775,6 +775,35 @@ fn forged_states_change_nothing_unless_they_are_taken() {
     assert!(taken > 100 && refused > 100, "{taken} {refused}");
 }
 
+/// A slave that is handed on: FMI lets a host call from any thread, one at a time.
+struct HandedOn<'a>(Slave<'a>);
+
+unsafe impl Send for HandedOn<'_> {}
+
+#[test]
+fn an_instance_goes_from_thread_to_thread() {
+    let fmu = fmu();
+    let expected = run(&fmu, &fmu.instantiate("stays", false).unwrap(), 20);
+    let made = thread::scope(|scope| {
+        let make = scope.spawn(|| HandedOn(fmu.instantiate("goes", false).unwrap()));
+        make.join().unwrap()
+    });
+    let stepped = thread::scope(|scope| {
+        let step = scope.spawn(|| {
+            let slave = made;
+            assert_eq!(run(&fmu, &slave.0, 20), expected);
+            slave
+        });
+        step.join().unwrap()
+    });
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            let slave = stepped;
+            drop(slave);
+        });
+    });
+}
+
 #[test]
 fn instances_do_not_see_each_other() {
     let fmu = fmu();
