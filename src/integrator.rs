@@ -71,18 +71,19 @@ const FADED: f64 = 0.01;
 /// The size that the disturbance had at first, rad; about the roundings of a rod in space.
 const ROUNDINGS: f64 = 1e-12;
 
-/// Energy that a step may gain, relative, over the error that goes with its time: those in space that follow the motion gain up to 4
-/// times that, those that pass the end of a rotation vector 400 times and more.
+/// Energy that a step may gain, relative, over the error that goes with its time: those in space that follow the motion gain
+/// up to 4 times that, those that pass the end of a rotation vector 400 times and more.
 const GAIN: f64 = 12.0;
 
 /// Kinetic energy up to which a rod rests, over that of motions as large as the rod with an amplitude of the tolerance.
 const AT_REST: f64 = 1e-6;
 
-/// Part of the time in which gravity or stiffness move the whole rod that a step in a plane may gain as much energy as, however
-/// short it is: in a whip errors of a step are a part of its square, and shorter ones never good enough.
+/// Length of a step in a plane, over the time in which gravity or stiffness move the whole rod, up to which it may gain as
+/// much energy as one so long: in a whip the gain goes with its square, and no shorter one would be good enough.
 const SUDDEN: f64 = 0.002;
 
-/// The same by which a step of implicit Euler, which should lose some, has gone over to another solution.
+/// Energy, relative, that a step of implicit Euler, which should lose some, gains where it has gone over to another
+/// solution.
 const WILD: f64 = 0.5;
 
 /// Part of a load or an acceleration by which it may differ and has not jumped: hosts round the time.
@@ -169,8 +170,7 @@ struct Pace {
     shortest: f64,
 }
 
-// how far it may go is settled at the start
-// what simple steps are allowed is set at every one
+// how far it may go is settled at the start, what simple steps are allowed at every one
 archived!(Pace { next } but { allowed, order, shortest });
 archived!(Effort { steps, iterations, retries, order, step, planar, error, space_error });
 
@@ -294,27 +294,10 @@ pub struct Integrator {
 }
 
 impl Integrator {
-    /// A rod that starts from the stepper's state under `boundary`. Its cells are as fine as the `refiner` wants them while
-    /// it moves accurately; without one they stay. `step`, s, and `scheme` are those of generalized-α.
-    ///
-    /// # Errors
-    /// [`Diverged`] if the equations of motion at the start are singular.
+    /// A rod that goes on from the stepper's state, which was [started](Stepper::start) under `boundary` unless it rests, or
+    /// is room for what is to be loaded. Its cells are as fine as the `refiner` wants them while it moves accurately; without
+    /// one they stay. `step`, s, and `scheme` are those of generalized-α.
     pub fn new(
-        mut stepper: Stepper,
-        refiner: Option<Refiner>,
-        way: Way,
-        scheme: Scheme,
-        step: f64,
-        boundary: &Boundary,
-    ) -> Result<Self, Diverged> {
-        if way != Way::Static {
-            stepper.start(boundary)?;
-        }
-        Ok(Self::room(stepper, refiner, way, scheme, step, boundary))
-    }
-
-    /// The same with accelerations of zero: room for what is to be loaded.
-    pub fn room(
         mut stepper: Stepper,
         refiner: Option<Refiner>,
         way: Way,
@@ -669,6 +652,12 @@ impl Integrator {
         (must, refuses): (bool, bool),
     ) -> Outcome {
         let begin = drive(time).boundary;
+        let jumped = has_jumped(&self.stepper.state.boundary, &begin);
+        let started = if jumped || self.stepper.state.dt > 0.0 { self.stepper.accelerate(&begin) } else { Ok(()) };
+        if jumped {
+            // gravity may be other than before
+            self.see_energy(&begin.gravity);
+        }
         let drift = self.drift * dt;
         let pace = match method.order {
             2 => {
@@ -677,13 +666,6 @@ impl Integrator {
             }
             _ => &mut self.pace,
         };
-        let jumped = has_jumped(&self.stepper.state.boundary, &begin);
-        let started = if jumped || self.stepper.state.dt > 0.0 { self.stepper.accelerate(&begin) } else { Ok(()) };
-        if jumped {
-            // gravity may be other than before
-            let Stepper { mesh, rod, state, .. } = &self.stepper;
-            self.energy = self.energy.now(&Energy::of(mesh, rod, state, &begin.gravity));
-        }
         let at = |since: f64| drive(time + since).boundary;
         let attempted = started.and_then(|()| self.stepper.attempt(method, &at, dt, pace.allowed));
         let Attempt { iterations, error, work } = match attempted {
@@ -722,7 +704,7 @@ impl Integrator {
         Outcome::Taken
     }
 
-    /// Reads the energies of the rod in space, which other cells have changed.
+    /// Reads the energies of the rod in space, which other cells or another gravity have changed.
     fn see_energy(&mut self, gravity: &Vec3) {
         let Stepper { mesh, rod, state, .. } = &self.stepper;
         self.energy = self.energy.now(&Energy::of(mesh, rod, state, gravity));

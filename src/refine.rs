@@ -289,8 +289,8 @@ impl Refiner {
         }
     }
 
-    /// Refines and, if it `joins`, coarsens the cells of a rod that neither shears nor stretches, clamped at its base and free at its
-    /// tip; whether they have changed. Others keep their cells. `boundary` is what acts now; the accelerations are
+    /// Refines and, if it `joins`, coarsens the cells of a rod that neither shears nor stretches, clamped at its base and
+    /// free at its tip; whether they have changed. Others keep their cells. `boundary` is what acts now; the accelerations are
     /// consistent with it afterwards, as after [`Stepper::accelerate`], and [`Stepper::previous`] is lost.
     ///
     /// # Errors

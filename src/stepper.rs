@@ -124,7 +124,7 @@ impl fmt::Display for Diverged {
 
 impl std::error::Error for Diverged {}
 
-/// A step of order 4 that was computed.
+/// A step of a Runge-Kutta method that was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attempt {
     /// Newton iterations, of all stages.

@@ -559,14 +559,17 @@ impl Parameters {
             }
         }
         let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
-        Integrator::new(stepper, refiner, way, scheme, step, boundary).map_err(Error::NoStart)
+        if way != Way::Static {
+            stepper.start(boundary).map_err(Error::NoStart)?;
+        }
+        Ok(Integrator::new(stepper, refiner, way, scheme, step, boundary))
     }
 
     /// The same rod where it has not been started.
     fn room(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
         let (stepper, refiner) = self.unstressed(boundary, tolerance)?;
         let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
-        Ok(Integrator::room(stepper, refiner, way, scheme, step, boundary))
+        Ok(Integrator::new(stepper, refiner, way, scheme, step, boundary))
     }
 
     fn unstressed(&self, boundary: &Boundary, tolerance: f64) -> Result<(Stepper, Option<Refiner>), Error> {
