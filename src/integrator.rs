@@ -16,13 +16,13 @@ use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive};
 use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Origin};
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
 use crate::refine::Refiner;
 use crate::rosenbrock::{RODAS4, RODAS5P};
 use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
-use crate::stepper::{Attempt, Diverged, Reason, Stepper};
+use crate::stepper::{Attempt, Diverged, Reason, Stepper, singular};
 use nalgebra::{Matrix3, Vector3};
 
 type Vec3 = Vector3<f64>;
@@ -219,6 +219,28 @@ enum Outcome {
     TooCoarse(bool),
 }
 
+/// What happened to a rod in an interval.
+#[derive(Clone, Debug)]
+enum Event {
+    /// A step in a plane, of so many s.
+    InPlane(f64),
+    /// A step in space by a method.
+    InSpace(&'static RungeKutta, f64),
+    /// One without an estimate of its error.
+    Unestimated(f64),
+    /// Other cells.
+    Cells(Vec<Origin>),
+}
+
+/// An interval as it was gone through: what a rod began with, the steps it took, the cells it had. All that follows from
+/// estimates and bounds is settled, so that its end is a smooth function of what acts.
+#[derive(Clone, Debug)]
+pub struct Course {
+    begin: Integrator,
+    events: Vec<Event>,
+    duration: f64,
+}
+
 /// A rod that may be in a plane.
 #[derive(Clone, Debug)]
 struct Planar {
@@ -291,6 +313,8 @@ pub struct Integrator {
     mesh_before: Mesh,
     /// What chooses the cells, now and before the interval.
     refiners: Option<(Refiner, Refiner)>,
+    /// What happens, if that is to be known.
+    events: Option<Vec<Event>>,
 }
 
 impl Integrator {
@@ -367,6 +391,7 @@ impl Integrator {
                 let kept = refiner.kept();
                 (refiner, kept)
             }),
+            events: None,
             stepper,
         }
     }
@@ -422,6 +447,21 @@ impl Integrator {
         }
         if let Some((now, before)) = &mut self.refiners {
             now.copy_from(before);
+        }
+        if let Some(events) = &mut self.events {
+            events.clear();
+        }
+    }
+
+    fn note(&mut self, event: Event) {
+        if let Some(events) = &mut self.events {
+            events.push(event);
+        }
+    }
+
+    fn note_cells(&mut self) {
+        if let (Some(events), Some((refiner, _))) = (&mut self.events, &self.refiners) {
+            events.push(Event::Cells(refiner.origins().to_vec()));
         }
     }
 
@@ -523,6 +563,7 @@ impl Integrator {
                 if changed {
                     planar.disturbance.go_on(&planar.plane);
                     self.energy = self.energy.now(&planar.plane.energy());
+                    self.note_cells();
                 }
             }
             time = if last { duration } else { time + dt };
@@ -552,19 +593,7 @@ impl Integrator {
             self.effort.retried();
             return Outcome::TooLong;
         }
-        let begin = if works { plane.power() } else { Powers::default() };
-        plane.accept();
-        let mut work = Powers::default();
-        if works {
-            plane.look(0.5, &drive(0.5 * dt));
-            let middle = plane.power();
-            plane.look(1.0, &drive(dt));
-            // Simpson's rule
-            work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
-        } else {
-            plane.look(1.0, &drive(dt));
-        }
-        let energy = self.energy.worked(&work).now(&plane.energy());
+        let energy = take_in_plane(plane, drive, dt, works, &self.energy);
         if gain(&self.energy, &energy, self.large) > GAIN * self.drift * dt.max(SUDDEN * *time) {
             plane.take_back();
             plane.look(1.0, &drive(0.0));
@@ -578,12 +607,16 @@ impl Integrator {
                 disturbance.go_on(plane);
                 self.energy = self.energy.now(&plane.energy());
                 self.effort.retried();
+                if refused.is_ok() {
+                    self.note_cells();
+                }
                 return Outcome::TooCoarse(refused.is_ok());
             }
         }
         self.energy = energy;
         self.effort.took(plane.order(), dt, error);
         self.effort.planar = true;
+        self.note(Event::InPlane(dt));
         Outcome::Taken
     }
 
@@ -636,6 +669,7 @@ impl Integrator {
                 self.effort.space_error = self.effort.space_error.max(refiner.estimated());
                 if changed {
                     self.see_energy(&now.gravity);
+                    self.note_cells();
                 }
             }
         }
@@ -651,6 +685,67 @@ impl Integrator {
         (time, dt): (f64, f64),
         (must, refuses): (bool, bool),
     ) -> Outcome {
+        let accuracy = self.pace_of(method, dt).allowed;
+        let Attempt { iterations, error, work } = match self.compute(method, drive, (time, dt), accuracy) {
+            Ok(attempt) => attempt,
+            Err(diverged) => {
+                self.pace_of(method, dt).next = dt * LOST;
+                self.effort.iterated(diverged.iterations);
+                self.effort.retried();
+                return Outcome::TooLong;
+            }
+        };
+        let fits = self.pace_of(method, dt).allows(dt, error);
+        self.effort.iterated(iterations);
+        let Stepper { mesh, rod, .. } = &self.stepper;
+        let state = self.stepper.attempted();
+        let energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
+        let grows = gain(&self.energy, &energy, self.large) > GAIN * self.drift * dt;
+        if fits && grows {
+            self.pace_of(method, dt).next = dt * LOST;
+        }
+        if grows || !(fits || must) {
+            self.effort.retried();
+            return Outcome::TooLong;
+        }
+        if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
+            let begin = drive(time).boundary;
+            let refused = refiner.refuse(&mut self.stepper, &begin);
+            if refused != Ok(false) {
+                self.see_energy(&begin.gravity);
+                self.effort.retried();
+                if refused.is_ok() {
+                    self.note_cells();
+                }
+                return Outcome::TooCoarse(refused.is_ok());
+            }
+        }
+        self.stepper.accept();
+        self.energy = energy;
+        self.effort.took(method.order, dt, error);
+        self.note(Event::InSpace(method, dt));
+        Outcome::Taken
+    }
+
+    /// The pace of steps by `method`, now that one is to be of `dt` s.
+    fn pace_of(&mut self, method: &RungeKutta, dt: f64) -> &mut Pace {
+        match method.order {
+            2 => {
+                self.simple.allowed = self.drift * dt;
+                &mut self.simple
+            }
+            _ => &mut self.pace,
+        }
+    }
+
+    /// Computes a step of `dt` s in space from `time` on, and what an iteration need not resolve is `accuracy`.
+    fn compute(
+        &mut self,
+        method: &'static RungeKutta,
+        drive: &impl Fn(f64) -> Drive,
+        (time, dt): (f64, f64),
+        accuracy: f64,
+    ) -> Result<Attempt, Diverged> {
         let begin = drive(time).boundary;
         let jumped = has_jumped(&self.stepper.state.boundary, &begin);
         let started = if jumped || self.stepper.state.dt > 0.0 { self.stepper.accelerate(&begin) } else { Ok(()) };
@@ -658,50 +753,8 @@ impl Integrator {
             // gravity may be other than before
             self.see_energy(&begin.gravity);
         }
-        let drift = self.drift * dt;
-        let pace = match method.order {
-            2 => {
-                self.simple.allowed = drift;
-                &mut self.simple
-            }
-            _ => &mut self.pace,
-        };
         let at = |since: f64| drive(time + since).boundary;
-        let attempted = started.and_then(|()| self.stepper.attempt(method, &at, dt, pace.allowed));
-        let Attempt { iterations, error, work } = match attempted {
-            Ok(attempt) => attempt,
-            Err(diverged) => {
-                pace.next = dt * LOST;
-                self.effort.iterated(diverged.iterations);
-                self.effort.retried();
-                return Outcome::TooLong;
-            }
-        };
-        let fits = pace.allows(dt, error);
-        self.effort.iterated(iterations);
-        let Stepper { mesh, rod, .. } = &self.stepper;
-        let state = self.stepper.attempted();
-        let energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
-        let grows = gain(&self.energy, &energy, self.large) > GAIN * drift;
-        if fits && grows {
-            pace.next = dt * LOST;
-        }
-        if grows || !(fits || must) {
-            self.effort.retried();
-            return Outcome::TooLong;
-        }
-        if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
-            let refused = refiner.refuse(&mut self.stepper, &begin);
-            if refused != Ok(false) {
-                self.see_energy(&begin.gravity);
-                self.effort.retried();
-                return Outcome::TooCoarse(refused.is_ok());
-            }
-        }
-        self.stepper.accept();
-        self.energy = energy;
-        self.effort.took(method.order, dt, error);
-        Outcome::Taken
+        started.and_then(|()| self.stepper.attempt(method, &at, dt, accuracy))
     }
 
     /// Reads the energies of the rod in space, which other cells or another gravity have changed.
@@ -754,6 +807,7 @@ impl Integrator {
                     _ => 1,
                 };
                 self.effort.took(order, dt, 0.0);
+                self.note(Event::Unestimated(dt));
                 Ok(())
             }
             Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
@@ -782,6 +836,123 @@ impl Integrator {
             Drive { boundary, rates }
         };
         self.step(&steady, Kind::Resting, 0.0, duration, 0)
+    }
+
+    /// The last interval as it was gone through, of this duration and under this drive.
+    ///
+    /// # Errors
+    /// [`Failed`] if duration or drive are others.
+    pub fn course(&self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<Course, Failed> {
+        let mut begin = self.clone();
+        begin.restore();
+        let mut again = begin.clone();
+        again.events = Some(Vec::new());
+        again.advance(drive, duration)?;
+        Ok(Course { begin, events: again.events.unwrap_or_default(), duration })
+    }
+
+    /// The rod started anew under `boundary`, on the cells that it has: in equilibrium if it `rests`, else with its rest
+    /// shape.
+    ///
+    /// # Errors
+    /// [`Diverged`] if there is no such start near the present state.
+    pub fn restarted(&self, boundary: &Boundary, rests: bool) -> Result<Self, Diverged> {
+        let mut rod = self.clone();
+        rod.leave_plane();
+        let stepper = &mut rod.stepper;
+        if rests {
+            stepper.relax(boundary)?;
+        } else {
+            stepper.state = State::at_rest_shape(&stepper.mesh, &boundary.base);
+        }
+        if rod.way != Way::Static {
+            rod.stepper.start(boundary)?;
+        }
+        rod.see_energy(&boundary.gravity);
+        Ok(rod)
+    }
+
+    fn leave_plane(&mut self) {
+        self.in_space();
+        self.in_plane = false;
+    }
+
+    /// Goes through a course again, in space: a step in a plane like one of order 4.
+    fn repeat(&mut self, events: &[Event], drive: &impl Fn(f64) -> Drive) -> Result<(), Failed> {
+        self.leave_plane();
+        let mut time = 0.0;
+        for event in events {
+            match event {
+                Event::InPlane(dt) | Event::InSpace(_, dt) => {
+                    let method = if let Event::InSpace(method, _) = event { method } else { &ESDIRK4 };
+                    self.step_again(method, drive, time, *dt, 0)?;
+                    time += dt;
+                }
+                Event::Unestimated(dt) => {
+                    self.step(drive, Kind::Damped, time, *dt, MAX_HALVINGS)?;
+                    time += dt;
+                }
+                Event::Cells(origins) => {
+                    let Some((refiner, _)) = &mut self.refiners else { continue };
+                    let now = drive(time).boundary;
+                    let changed = refiner.change_to(origins, &mut self.stepper, &now);
+                    changed.map_err(|cause| Failed { time, step: 0.0, cause })?;
+                    self.see_energy(&now.gravity);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The same in the plane that the rod stays in.
+    fn repeat_in_plane(&mut self, events: &[Event], drive: &impl Fn(f64) -> Drive) -> Result<(), Failed> {
+        let Some(Planar { plane, .. }) = &mut self.planar else { return Ok(()) };
+        plane.look(1.0, &drive(0.0));
+        self.energy = self.energy.now(&plane.energy());
+        let mut time = 0.0;
+        for event in events {
+            match event {
+                Event::InPlane(dt) => {
+                    let at = |since: f64| drive(time + since);
+                    plane.attempt(&at, *dt).map_err(|cause| Failed { time, step: *dt, cause: singular(cause) })?;
+                    self.energy = take_in_plane(plane, &at, *dt, true, &self.energy);
+                    time += dt;
+                }
+                Event::Cells(origins) => {
+                    let Some((refiner, _)) = &mut self.refiners else { continue };
+                    let changed = refiner.change_plane_to(origins, plane, &drive(time));
+                    changed.map_err(|cause| Failed { time, step: 0.0, cause: singular(cause) })?;
+                    self.energy = self.energy.now(&plane.energy());
+                }
+                Event::InSpace(..) | Event::Unestimated(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of a course from `time`, or its two halves where the like of a step in a plane is too long in space.
+    fn step_again(
+        &mut self,
+        method: &'static RungeKutta,
+        drive: &impl Fn(f64) -> Drive,
+        time: f64,
+        dt: f64,
+        halvings: u32,
+    ) -> Result<(), Failed> {
+        match self.compute(method, drive, (time, dt), 0.0) {
+            Ok(Attempt { work, .. }) => {
+                let Stepper { mesh, rod, .. } = &self.stepper;
+                let state = self.stepper.attempted();
+                self.energy = self.energy.with(mesh, rod, state, &state.boundary.gravity, &work);
+                self.stepper.accept();
+                Ok(())
+            }
+            Err(cause) if halvings == MAX_HALVINGS => Err(Failed { time, step: dt, cause }),
+            Err(_) => {
+                self.step_again(method, drive, time, 0.5 * dt, halvings + 1)?;
+                self.step_again(method, drive, time + 0.5 * dt, 0.5 * dt, halvings + 1)
+            }
+        }
     }
 
     /// The ends of the rod at present.
@@ -856,19 +1027,53 @@ impl Integrator {
     }
 }
 
+impl Course {
+    /// Whether all of it was in a plane, and would have been under another `drive`.
+    pub fn stays_in_plane(&self, drive: &impl Fn(f64) -> Drive) -> bool {
+        let in_plane = |event: &Event| matches!(event, Event::InPlane(_) | Event::Cells(_));
+        let mut rod = self.begin.clone();
+        rod.choose(drive, self.duration);
+        rod.in_plane && self.events.iter().all(in_plane)
+    }
+
+    /// The rod at the end of the interval, had it been under another `drive`: in a plane, if it is one that it
+    /// [stays](Self::stays_in_plane) in, else in space, which sees what leads out of it.
+    ///
+    /// # Errors
+    /// [`Failed`] if that is too far from the one it was under.
+    pub fn under(&self, drive: &impl Fn(f64) -> Drive, in_plane: bool) -> Result<Integrator, Failed> {
+        let mut rod = self.begin.clone();
+        match rod.way {
+            Way::Accurate { .. } => {
+                if in_plane {
+                    rod.choose(drive, self.duration);
+                }
+                match in_plane && rod.in_plane {
+                    true => rod.repeat_in_plane(&self.events, drive)?,
+                    false => rod.repeat(&self.events, drive)?,
+                }
+            }
+            // steps of equal length, and none, need nothing settled
+            Way::Equal | Way::Static => rod.advance(drive, self.duration)?,
+        }
+        Ok(rod)
+    }
+}
+
 /// What a step has added to the energy beyond the work that was done in it, relative to it, or to the `large` one, J, that
 /// gravity and bending can give.
 fn gain(before: &Energy, after: &Energy, large: f64) -> f64 {
     (after.residual(before) - before.residual(before)) / (large + after.kinetic + after.elastic)
 }
 
-/// What is kept before an interval, so that a step that fails is undone, decides all that follows: that is stored, for a
-/// rod that was started alike to go on from.
+/// What is kept before an interval, so that a step that fails is undone, is all that decides what follows, for a rod that
+/// was started alike. It is loaded from what the present saves in its place.
 impl Archived for Integrator {
     fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
-        self.keep();
-        let Self { planar, large, before, state_before, mesh_before, refiners, .. } = self;
-        let Before { in_plane, pace, simple, energy, effort } = before;
+        let loading = archive.is_loading();
+        let Self { stepper, in_plane, planar, pace, simple, large, energy, effort, before, refiners, .. } = self;
+        let mut now = Before { in_plane: *in_plane, pace: *pace, simple: *simple, energy: *energy, effort: *effort };
+        let Before { in_plane, pace, simple, energy, effort } = if loading { before } else { &mut now };
         in_plane.visit(archive)?;
         pace.visit(archive)?;
         simple.visit(archive)?;
@@ -876,28 +1081,57 @@ impl Archived for Integrator {
         effort.visit(archive)?;
         // of a length summed up over the cells of the start
         large.visit(archive)?;
-        if let Some(Planar { before: (pace, disturbance, unwatched), .. }) = planar {
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = planar {
+            let (pace, disturbance, unwatched) = match loading {
+                true => (&mut before.0, &mut before.1, &mut before.2),
+                false => (pace, disturbance, unwatched),
+            };
             pace.visit(archive)?;
             disturbance.visit(archive)?;
             unwatched.visit(archive)?;
         }
         match planar {
-            Some(Planar { kept, .. }) if *in_plane => kept.visit(archive)?,
+            Some(Planar { kept, .. }) if *in_plane && loading => kept.visit(archive)?,
+            Some(Planar { plane, kept, .. }) if *in_plane => {
+                let mut kept = kept.clone();
+                plane.keep(&mut kept);
+                kept.visit(archive)?;
+            }
             _ => {
-                let Mesh { cells, rule } = mesh_before;
-                cells.visit(archive)?;
-                state_before.resize(cells.len(), rule.stages);
-                state_before.visit(archive)?;
+                let (mesh, state) = match loading {
+                    true => (&mut self.mesh_before, &mut self.state_before),
+                    false => (&mut stepper.mesh, &mut stepper.state),
+                };
+                mesh.cells.visit(archive)?;
+                state.resize(mesh.cells.len(), mesh.rule.stages);
+                state.visit(archive)?;
             }
         }
-        if let Some((_, before)) = refiners {
-            before.visit(archive)?;
+        if let Some((now, before)) = refiners {
+            if loading { before } else { now }.visit(archive)?;
         }
-        if archive.is_loading() {
+        if loading {
             self.restore();
         }
         Ok(())
     }
+}
+
+/// Takes the step of `dt` s that was attempted in a plane; the energy after it, with what worked if anything `works`.
+fn take_in_plane(plane: &mut Plane, drive: &impl Fn(f64) -> Drive, dt: f64, works: bool, before: &Energy) -> Energy {
+    let begin = if works { plane.power() } else { Powers::default() };
+    plane.accept();
+    let mut work = Powers::default();
+    if works {
+        plane.look(0.5, &drive(0.5 * dt));
+        let middle = plane.power();
+        plane.look(1.0, &drive(dt));
+        // Simpson's rule
+        work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
+    } else {
+        plane.look(1.0, &drive(dt));
+    }
+    before.worked(&work).now(&plane.energy())
 }
 
 /// Makes the rod in a plane that of `stepper`.

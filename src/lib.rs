@@ -10,7 +10,7 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
+//! host =C=> fmi2 -> sensitivity -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
 //!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
 //!      examples, tests -> rate -> formulation -> {energy, stepper}
 //!                       pose, rate -> {alpha, boundary, rod, mesh, archive, so3}
@@ -76,6 +76,7 @@ pub mod modes;
 pub mod integrator;
 pub mod path;
 pub mod unit;
+pub mod sensitivity;
 
 pub mod fmi2;
 pub mod package;

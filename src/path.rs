@@ -130,6 +130,11 @@ impl Path {
         &self.base
     }
 
+    /// Whether it has left its beginning.
+    pub fn has_begun(&self) -> bool {
+        self.samples > 0
+    }
+
     /// The path over the next `step` s, from a sample at its start.
     pub fn segment(&self, sample: &Sample, step: f64) -> Segment {
         let mut next = self.clone();

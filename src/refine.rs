@@ -150,6 +150,36 @@ impl Refiner {
         self.most_cells
     }
 
+    /// Of which the cells come since the last change.
+    pub fn origins(&self) -> &[Origin] {
+        &self.origins
+    }
+
+    /// Changes the cells to those with these `origins`, as [`adapt`](Self::adapt) or [`refuse`](Self::refuse) once did.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Self::adapt`].
+    pub fn change_to(&mut self, origins: &[Origin], stepper: &mut Stepper, now: &Boundary) -> Result<(), Diverged> {
+        self.set_cells(origins, &stepper.mesh);
+        self.change(stepper, now)
+    }
+
+    /// The same of a rod in a plane.
+    ///
+    /// # Errors
+    /// [`Singular`] as of [`Self::adapt_plane`].
+    pub fn change_plane_to(&mut self, origins: &[Origin], plane: &mut Plane, now: &Drive) -> Result<(), Singular> {
+        self.set_cells(origins, plane.mesh());
+        self.change_plane(plane, now)
+    }
+
+    fn set_cells(&mut self, origins: &[Origin], mesh: &Mesh) {
+        self.origins.clear();
+        self.origins.extend_from_slice(origins);
+        self.cells.clear();
+        self.cells.extend(origins.iter().map(|origin| origin.cell(&mesh.cells)));
+    }
+
     /// The estimate of the last call of any kind.
     pub fn estimated(&self) -> f64 {
         self.errors.iter().sum()

@@ -823,7 +823,7 @@ impl Stepper {
 }
 
 /// A linear problem without a unique solution.
-fn singular(singular: Singular) -> Diverged {
+pub(crate) fn singular(singular: Singular) -> Diverged {
     Diverged { iterations: 1, residual: f64::INFINITY, reason: Reason::Singular(singular) }
 }
 

@@ -5,9 +5,9 @@
 
 use crate::alpha::Scheme;
 use crate::archive::{self, Archive, Archived, Corrupt, archived};
-use crate::boundary::{Boundary, Drive, Rates};
+use crate::boundary::{Boundary, Drive, Rates, Support};
 use crate::energy::Energy;
-use crate::integrator::{Effort, Ends, Failed, Integrator, Way};
+use crate::integrator::{Course, Effort, Ends, Failed, Integrator, Way};
 use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
@@ -18,7 +18,7 @@ use crate::so3;
 use crate::stepper::{Diverged, Stepper};
 use nalgebra::{Vector3, Vector4};
 use std::f64::consts::PI;
-use std::fmt;
+use std::{fmt, mem};
 
 /// Number of stations of the centreline handed out for drawing, base and tip included.
 pub const STATIONS: usize = 11;
@@ -305,6 +305,8 @@ pub enum Error {
     },
     /// The equations of motion at the start are singular.
     NoStart(Diverged),
+    /// There is no step that the outputs could be differentiated in.
+    NoStep,
     /// No equilibrium follows the last one: a rod that buckles or snaps is not at rest in between.
     NoEquilibriumNearby {
         /// Time since the start of the communication step, s.
@@ -335,6 +337,10 @@ impl fmt::Display for Error {
                 "start_in_equilibrium: the static equilibrium is unstable (lowest squared frequency {omega_squared:.3e} 1/s2)"
             ),
             Self::NoStart(cause) => write!(f, "the equations of motion at the start have no solution ({cause})"),
+            Self::NoStep => write!(
+                f,
+                "there is no step to differentiate in: a state was set, or a step has failed, since the last one"
+            ),
             Self::NoEquilibriumNearby { time, cause } => write!(
                 f,
                 "quasi_static: no static equilibrium follows the one at {time:.6} s after the communication point, as \
@@ -396,6 +402,18 @@ struct Start {
 
 archived!(Start { parameters, inputs, tolerance });
 
+impl Start {
+    /// A path that begins where these inputs say.
+    fn path(&self, inputs: &Inputs) -> Path {
+        let given = match self.parameters.base_motion {
+            0 => Given::PoseAndTwist,
+            1 => Given::Pose,
+            _ => Given::Twist,
+        };
+        Path::new(given, inputs.sample())
+    }
+}
+
 /// One rod, started and ready to step.
 #[derive(Clone, Debug)]
 pub struct Unit {
@@ -408,6 +426,34 @@ pub struct Unit {
     path: Path,
     warned: bool,
     outputs: Outputs,
+    /// The last communication step, as long as the integrator knows where it began.
+    last: Option<Last>,
+}
+
+/// A communication step: the path before it, what acted in it, its length in s.
+#[derive(Clone, Debug)]
+struct Last {
+    path: Path,
+    acting: Acting,
+    duration: f64,
+}
+
+/// What acts on a rod in a communication step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Acting {
+    /// The inputs.
+    pub inputs: Inputs,
+    /// Gravity, world frame, m/s².
+    pub gravity: Vector3<f64>,
+}
+
+/// The outputs as functions of what acts, in the last communication step as it was gone through or, before the first, at
+/// the start: number, order and length of the internal steps and cells are settled.
+#[derive(Clone, Debug)]
+pub struct Response<'a> {
+    unit: &'a Unit,
+    /// Of a step; there is none of a start.
+    course: Option<(Course, &'a Last)>,
 }
 
 impl Parameters {
@@ -525,7 +571,7 @@ impl Parameters {
     }
 
     /// The shortest time in which gravity or stiffness move the whole rod, s.
-    fn time(&self, rod: &Rod) -> f64 {
+    pub fn time(&self, rod: &Rod) -> f64 {
         let mass = rod.mass_per_length * self.length;
         let swing = (self.length / self.gravity.norm()).sqrt();
         let vibration = (mass * self.length.powi(3) / rod.stiffness.x.max(rod.stiffness.y)).sqrt();
@@ -677,19 +723,8 @@ impl Unit {
         inputs.validate()?;
         let given = |value: &f64| value.is_finite() && *value > 0.0;
         let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
-        let path = Path::new(
-            match parameters.base_motion {
-                0 => Given::PoseAndTwist,
-                1 => Given::Pose,
-                _ => Given::Twist,
-            },
-            inputs.sample(),
-        );
-        let boundary = Boundary {
-            tip_force: inputs.tip_force,
-            tip_moment: inputs.tip_moment,
-            ..Boundary::hanging_from(*path.base(), parameters.gravity)
-        };
+        let path = start.path(inputs);
+        let boundary = Acting { inputs: inputs.clone(), gravity: parameters.gravity }.on(*path.base());
         Ok(Self {
             integrator: begin(parameters, &boundary, tolerance)?,
             step: (parameters.step > 0.0 || parameters.extensible)
@@ -699,6 +734,7 @@ impl Unit {
             path,
             warned: false,
             outputs: Outputs::default(),
+            last: None,
             start,
         })
     }
@@ -720,28 +756,41 @@ impl Unit {
             let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
             return Err(Error::NotAllowed { name: "step", value: step, allowed });
         }
+        self.last = None;
+        let acting = Acting { inputs: inputs.clone(), gravity: self.gravity };
         let segment = self.path.segment(&inputs.sample(), step_size);
-        let gravity = self.gravity;
-        let drive = |time: f64| {
-            let (jerk, angular_acceleration) = segment.rates(time);
-            Drive {
-                boundary: Boundary {
-                    tip_force: inputs.tip_force,
-                    tip_moment: inputs.tip_moment,
-                    ..Boundary::hanging_from(segment.at(time), gravity)
-                },
-                rates: Rates { jerk, angular_acceleration, ..Rates::default() },
-            }
-        };
-        let done = self.integrator.advance(&drive, step_size);
-        done.map_err(|Failed { time, step, cause }| match self.quasi_static {
-            true => Error::NoEquilibriumNearby { time, cause },
-            false => Error::Diverged { time, step, cause },
-        })?;
+        let done = self.integrator.advance(&acting.along(&segment), step_size);
+        done.map_err(|failed| self.failure(failed))?;
         let warning = self.disagreement(&segment, step_size);
-        self.path = segment.into_path();
+        let before = mem::replace(&mut self.path, segment.into_path());
+        self.last = Some(Last { path: before, acting, duration: step_size });
         self.read_out(inputs);
         Ok(warning)
+    }
+
+    fn failure(&self, Failed { time, step, cause }: Failed) -> Error {
+        match self.quasi_static {
+            true => Error::NoEquilibriumNearby { time, cause },
+            false => Error::Diverged { time, step, cause },
+        }
+    }
+
+    /// How the outputs respond to what acts, and what acted.
+    ///
+    /// # Errors
+    /// [`Error::NoStep`] where a state was loaded, or a step has failed, since the last step.
+    pub fn response(&self) -> Result<Response<'_>, Error> {
+        let course = match &self.last {
+            None if self.path.has_begun() => return Err(Error::NoStep),
+            None => None,
+            Some(last) => {
+                let Last { path, acting, duration } = last;
+                let segment = path.segment(&acting.inputs.sample(), *duration);
+                let course = self.integrator.course(&acting.along(&segment), *duration);
+                Some((course.map_err(|failed| self.failure(failed))?, last))
+            }
+        };
+        Ok(Response { unit: self, course })
     }
 
     fn disagreement(&mut self, segment: &Segment, step_size: f64) -> Option<Warning> {
@@ -787,9 +836,15 @@ impl Unit {
     }
 
     fn read_out(&mut self, inputs: &Inputs) {
-        let (integrator, base) = (&self.integrator, self.path.base());
+        self.outputs.read(&self.integrator, self.path.base(), inputs);
+    }
+}
+
+impl Outputs {
+    /// What is to be read of a rod on this base, after a step with these inputs.
+    fn read(&mut self, integrator: &Integrator, base: &Support, inputs: &Inputs) {
         let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
-        self.outputs = Outputs {
+        *self = Self {
             tip_position: position,
             tip_orientation: so3::quaternion(&rotation),
             tip_velocity: velocity,
@@ -801,14 +856,89 @@ impl Unit {
             power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
-            ..self.outputs
+            ..*self
         };
-        integrator.centreline(&mut self.outputs.stations);
+        integrator.centreline(&mut self.stations);
+    }
+}
+
+impl Acting {
+    /// The same as functions of the time since the beginning of the step, on a base that follows `segment`.
+    fn along<'a>(&'a self, segment: &'a Segment) -> impl Fn(f64) -> Drive + 'a {
+        move |time| {
+            let (jerk, angular_acceleration) = segment.rates(time);
+            let rates = Rates { jerk, angular_acceleration, ..Rates::default() };
+            Drive { boundary: self.on(segment.at(time)), rates }
+        }
+    }
+
+    fn on(&self, base: Support) -> Boundary {
+        Boundary {
+            tip_force: self.inputs.tip_force,
+            tip_moment: self.inputs.tip_moment,
+            ..Boundary::hanging_from(base, self.gravity)
+        }
+    }
+}
+
+impl Response<'_> {
+    /// What acted.
+    pub fn acting(&self) -> Acting {
+        match &self.course {
+            Some((_, last)) => last.acting.clone(),
+            None => Acting { inputs: self.unit.start.inputs.clone(), gravity: self.unit.start.parameters.gravity },
+        }
+    }
+
+    /// Whether it would be all in a plane, had this acted.
+    pub fn stays_in_plane(&self, acting: &Acting) -> bool {
+        self.course.as_ref().is_some_and(|(course, Last { path, duration, .. })| {
+            let segment = path.segment(&acting.inputs.sample(), *duration);
+            course.stays_in_plane(&acting.along(&segment))
+        })
+    }
+
+    /// The outputs, had this acted, in a plane only if it [would be](Self::stays_in_plane). What counts the work done is as
+    /// it was.
+    ///
+    /// # Errors
+    /// [`Error`] as of [`Unit::new`] and [`Unit::advance`].
+    pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
+        let Unit { start, outputs, .. } = self.unit;
+        let (rod, path) = match &self.course {
+            Some((course, Last { path, duration, .. })) => {
+                let segment = path.segment(&acting.inputs.sample(), *duration);
+                let rod =
+                    course.under(&acting.along(&segment), in_plane).map_err(|failed| self.unit.failure(failed))?;
+                (rod, segment.into_path())
+            }
+            None => {
+                let path = start.path(&acting.inputs);
+                let Parameters { start_in_equilibrium, quasi_static, .. } = start.parameters;
+                let rests = start_in_equilibrium || quasi_static;
+                let rod = self.unit.integrator.restarted(&acting.on(*path.base()), rests);
+                (rod.map_err(Error::NoStart)?, path)
+            }
+        };
+        let mut outputs = outputs.clone();
+        let Outputs { solver, cells, .. } = outputs;
+        outputs.read(&rod, path.base(), &acting.inputs);
+        Ok(Outputs { solver, cells, ..outputs })
+    }
+
+    /// Of the rod.
+    pub fn parameters(&self) -> &Parameters {
+        &self.unit.start.parameters
+    }
+
+    /// Length of the communication step, s; none at the start.
+    pub fn duration(&self) -> Option<f64> {
+        self.course.as_ref().map(|(_, last)| last.duration)
     }
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static });
+archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static, last });
 
 /// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
 /// for bit as the one that was saved.
@@ -827,6 +957,10 @@ impl Archived for Option<Box<Unit>> {
             let room = Unit::of(start, Parameters::room);
             *self = Some(Box::new(room.map_err(|error| Corrupt::Refused { why: error.to_string() })?));
         }
-        self.as_deref_mut().map_or(Ok(()), |unit| unit.visit(archive))
+        let Some(unit) = self.as_deref_mut() else { return Ok(()) };
+        if archive.is_loading() {
+            unit.last = None;
+        }
+        unit.visit(archive)
     }
 }

@@ -294,7 +294,6 @@ unsafe fn status<T>(
     unsafe { call(component, function, body) }
 }
 
-const DIRECTIONAL: &str = "directional derivatives are";
 const INPUT_DERIVATIVES: &str = "derivatives of inputs are";
 const OUTPUT_DERIVATIVES: &str = "derivatives of outputs are";
 const CANCEL: &str = "asynchronous steps, and so cancelling one, are";
@@ -564,14 +563,21 @@ unsafe extern "C" fn fmi2DeSerializeFMUstate(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2GetDirectionalDerivative(
     c: fmi2Component,
-    _unknown: *const fmi2ValueReference,
-    _nUnknown: usize,
-    _known: *const fmi2ValueReference,
-    _nKnown: usize,
-    _dvKnown: *const fmi2Real,
-    _dvUnknown: *mut fmi2Real,
+    vUnknown_ref: *const fmi2ValueReference,
+    nUnknown: usize,
+    vKnown_ref: *const fmi2ValueReference,
+    nKnown: usize,
+    dvKnown: *const fmi2Real,
+    dvUnknown: *mut fmi2Real,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::GetDirectionalDerivative, DIRECTIONAL) }
+    let body = |instance: &mut Instance| {
+        let unknown = unsafe { slice(vUnknown_ref, nUnknown, "vUnknown_ref")? };
+        let known = unsafe { slice(vKnown_ref, nKnown, "vKnown_ref")? };
+        let direction = unsafe { slice(dvKnown, nKnown, "dvKnown")? };
+        let derivatives = unsafe { slice_mut(dvUnknown, nUnknown, "dvUnknown")? };
+        instance.directional_derivative(unknown, known, direction, derivatives)
+    };
+    unsafe { call(c, Function::GetDirectionalDerivative, body) }
 }
 
 #[unsafe(no_mangle)]

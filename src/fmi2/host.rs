@@ -720,6 +720,25 @@ impl Slave<'_> {
         Ok(state)
     }
 
+    /// `fmi2GetDirectionalDerivative`
+    pub fn directional_derivative(
+        &self,
+        unknown: &[fmi2ValueReference],
+        known: &[fmi2ValueReference],
+        direction: &[f64],
+    ) -> Result<Vec<f64>, Error> {
+        same(known.len(), direction.len())?;
+        let mut derivatives = vec![f64::NAN; unknown.len()];
+        let differentiate = self.functions.GetDirectionalDerivative;
+        self.check("fmi2GetDirectionalDerivative", unsafe {
+            let (unknown, unknowns) = (unknown.as_ptr(), unknown.len());
+            let (known, knowns) = (known.as_ptr(), known.len());
+            let into = derivatives.as_mut_ptr();
+            differentiate(self.component, unknown, unknowns, known, knowns, direction.as_ptr(), into)
+        })?;
+        Ok(derivatives)
+    }
+
     /// `fmi2GetReal`
     pub fn get_real(&self, references: &[fmi2ValueReference], values: &mut [f64]) -> Result<(), Error> {
         self.read("fmi2GetReal", self.functions.GetReal, references, values)

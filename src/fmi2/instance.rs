@@ -9,7 +9,8 @@ use super::saved::{self, Unreadable};
 use super::variables::{self, Kind, Variable};
 use crate::archive::{self, Archive, Archived, Corrupt, archived};
 use crate::integrator::Effort;
-use crate::unit::{self, Allowed, Inputs, Parameters, Unit};
+use crate::sensitivity::{self, Sensitivity};
+use crate::unit::{self, Acting, Allowed, Inputs, Parameters, Unit};
 use std::collections::BTreeMap;
 use std::{fmt, mem, ptr};
 
@@ -144,6 +145,14 @@ pub enum Failure {
         variable: Variable,
         value: f64,
     },
+    /// Of derivatives.
+    NotUnknown {
+        variable: Variable,
+    },
+    /// Of derivatives.
+    NotKnown {
+        variable: Variable,
+    },
     BadArgument {
         argument: &'static str,
         value: f64,
@@ -256,6 +265,10 @@ impl fmt::Display for Failure {
             }
             Self::NotAllowed { variable, value } => {
                 write!(f, "{variable} = {value} is not allowed: {}", variable.allowed())
+            }
+            Self::NotUnknown { variable } => write!(f, "{variable} is not computed: derivatives are those of outputs"),
+            Self::NotKnown { variable } => {
+                write!(f, "{variable} has no derivatives: they are those by inputs and tunable parameters")
             }
             Self::BadArgument { argument, value, allowed } => {
                 write!(f, "{argument} = {value} is not allowed: {allowed}")
@@ -628,6 +641,41 @@ impl Instance {
     /// The unit has no strings, so every reference is of the wrong kind, or of none.
     pub fn no_strings(&self, references: &[u32]) -> Answer {
         references.iter().try_for_each(|&reference| self.variable(reference, Kind::String).map(drop))?;
+        Ok(None)
+    }
+
+    /// How the unknowns, outputs all, change along a direction of the knowns, inputs and tunable parameters: those of the last
+    /// step, or of the start.
+    pub fn directional_derivative(
+        &mut self,
+        unknown: &[u32],
+        known: &[u32],
+        direction: &[f64],
+        derivatives: &mut [f64],
+    ) -> Answer {
+        let unknown = unknown.iter().map(|&reference| {
+            let variable = self.variable(reference, Kind::Real)?;
+            if variable.is_output() { Ok(variable) } else { Err(Failure::NotUnknown { variable }) }
+        });
+        let unknown = unknown.collect::<Result<Vec<_>, _>>()?;
+        let Acting { mut inputs, gravity } = sensitivity::nowhere();
+        let mut parameters = Parameters { gravity, ..Parameters::default() };
+        for (&reference, &part) in known.iter().zip(direction) {
+            let variable = self.variable(reference, Kind::Real)?;
+            if !variable.is_settable_while_stepping() {
+                return Err(Failure::NotKnown { variable });
+            }
+            if !part.is_finite() {
+                return Err(Failure::NotAllowed { variable, value: part });
+            }
+            let sum = variable.given(&mut parameters, &mut inputs).unwrap_or_default() + part;
+            variable.set(&mut parameters, &mut inputs, sum);
+        }
+        let direction = Acting { inputs, gravity: parameters.gravity };
+        let sensitivity = Sensitivity::new(self.unit()?, &direction)?;
+        for (variable, derivative) in unknown.iter().zip(derivatives) {
+            *derivative = sensitivity.of(|outputs| variable.computed(outputs).unwrap_or_default());
+        }
         Ok(None)
     }
 

@@ -224,6 +224,31 @@ def test_a_broken_state_is_refused_and_changes_nothing(description, instance):
     instance.doStep(currentCommunicationPoint=0.0, communicationStepSize=STEP)
 
 
+def test_directional_derivatives_are_those_of_steps_that_are_taken_back(description, reference, instance):
+    assert description.coSimulation.providesDirectionalDerivative
+    instance.setReal([reference["step"]], [0.002])
+    initialize(instance)
+    for k in range(20):
+        instance.doStep(currentCommunicationPoint=STEP * k, communicationStepSize=STEP)
+    state = instance.getFMUState()
+    unknown = array(reference, "tip.position") + array(reference, "base.reaction_force")
+    known = array(reference, "base.velocity")
+    direction = [0.6, -0.2, 0.3]
+
+    def outputs(size):
+        instance.setFMUState(state)
+        instance.setReal(known, [size * part for part in direction])
+        instance.doStep(currentCommunicationPoint=STEP * 20, communicationStepSize=STEP)
+        return np.array(instance.getReal(unknown))
+
+    difference = (outputs(1e-4) - outputs(-1e-4)) / 2e-4
+    outputs(0.0)
+    derivative = np.array(instance.getDirectionalDerivative(unknown, known, direction))
+    for rows in (slice(0, 3), slice(3, 6)):
+        assert np.linalg.norm(derivative[rows] - difference[rows]) < 1e-5 * np.linalg.norm(difference[rows])
+    instance.freeFMUState(state)
+
+
 def test_a_foreign_guid_gives_no_instance(unpacked, description):
     slave = FMU2Slave(
         guid="{00000000-0000-0000-0000-000000000000}",

@@ -1,0 +1,119 @@
+//! Derivatives of the outputs by what acts: along one direction, in the last communication step as it was gone through or,
+//! before the first, at the start.
+//!
+//! With the internal steps and the cells settled ([`Response`]) the outputs are smooth functions of what acts. Their
+//! derivative along a direction d is taken from four more passes through the step,
+//!
+//! ```text
+//! y' = (8 (y(+ε) − y(−ε)) − (y(+2ε) − y(−2ε))) / 12 ε          y(ε): the outputs, had x + ε d acted
+//! ```
+//!
+//! which leaves ε⁴ y⁽⁵⁾/30. ε d is a small part of what moves the rod as far as it is long, in the time in which gravity or
+//! stiffness do: so ε⁴ is below the roundings that ε divides.
+
+use crate::unit::{Acting, Error, Inputs, Outputs, Response, Unit};
+use nalgebra::{Vector3, Vector4};
+
+/// Part of what moves the rod as far as it is long.
+const SMALL: f64 = 1e-3;
+/// Weights of the passes through the step, and where they are.
+const STENCIL: [(f64, f64); 4] = [(-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0)];
+
+/// The outputs in the neighbourhood of the present ones, along a direction.
+#[derive(Clone, Debug)]
+pub struct Sensitivity {
+    near: [Outputs; STENCIL.len()],
+    /// ε.
+    distance: f64,
+}
+
+/// A direction along which nothing acts: to be filled with what is to change, in the units of the inputs and of gravity.
+pub fn nowhere() -> Acting {
+    let zero = Vector3::zeros();
+    Acting {
+        inputs: Inputs {
+            base_position: zero,
+            base_orientation: Vector4::zeros(),
+            base_velocity: zero,
+            base_angular_velocity: zero,
+            tip_force: zero,
+            tip_moment: zero,
+        },
+        gravity: zero,
+    }
+}
+
+impl Sensitivity {
+    /// Of the outputs of `unit` along a `direction`. Orientations count as far as they turn: a quaternion that is only
+    /// stretched changes nothing.
+    ///
+    /// # Errors
+    /// [`Error::NoStep`] where there is no step to differentiate in; other [`Error`]s if there is no such step nearby.
+    pub fn new(unit: &Unit, direction: &Acting) -> Result<Self, Error> {
+        let response = unit.response()?;
+        let acting = response.acting();
+        let most = size(direction, &response);
+        let distance = if most > 0.0 { SMALL / most } else { 1.0 };
+        // far enough along the direction to see whether it leads out of a plane
+        let in_plane = response.stays_in_plane(&moved(&acting, distance / SMALL, direction));
+        let turned = unit.outputs().tip_orientation;
+        let mut near: [Outputs; STENCIL.len()] = Default::default();
+        for (outputs, (place, _)) in near.iter_mut().zip(STENCIL) {
+            *outputs = response.to(&moved(&acting, place * distance, direction), in_plane)?;
+            // a quaternion and its negative are the same rotation
+            if outputs.tip_orientation.dot(&turned) < 0.0 {
+                outputs.tip_orientation.neg_mut();
+            }
+        }
+        Ok(Self { near, distance })
+    }
+
+    /// The derivative of one of the outputs.
+    pub fn of(&self, output: impl Fn(&Outputs) -> f64) -> f64 {
+        // in pairs, so that what does not change has a derivative of zero
+        let [far_below, below, above, far_above] = [0, 1, 2, 3].map(|k| output(&self.near[k]));
+        let [(_, far), (_, near), ..] = STENCIL;
+        (far * (far_below - far_above) + near * (below - above)) / self.distance
+    }
+}
+
+/// What acts, moved by so many of `direction`.
+fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
+    let (from, by) = (&acting.inputs, &direction.inputs);
+    Acting {
+        inputs: Inputs {
+            base_position: from.base_position + by.base_position * distance,
+            base_orientation: from.base_orientation + by.base_orientation * distance,
+            base_velocity: from.base_velocity + by.base_velocity * distance,
+            base_angular_velocity: from.base_angular_velocity + by.base_angular_velocity * distance,
+            tip_force: from.tip_force + by.tip_force * distance,
+            tip_moment: from.tip_moment + by.tip_moment * distance,
+        },
+        gravity: acting.gravity + direction.gravity * distance,
+    }
+}
+
+/// How many times `direction` moves the rod as far as it is long, in the time in which gravity or stiffness do. The base
+/// gets to its velocity, and to a position that its velocity is derived of, within the step.
+fn size(direction: &Acting, response: &Response) -> f64 {
+    let parameters = response.parameters();
+    let (rod, length) = (parameters.rod(), parameters.length);
+    let time = parameters.time(&rod);
+    let step = response.duration().map_or(time, |duration| duration.min(time));
+    let weight = (rod.mass_per_length * length + rod.tip_mass) * response.acting().gravity.norm();
+    let force = weight.max(rod.stiffness.max() / (length * length));
+    let turn = if parameters.base_motion == 1 { (step / time).powi(2) } else { step / time };
+    let rate = step / (time * time);
+    let Acting { inputs, gravity } = direction;
+    [
+        inputs.base_position.norm() / (length * turn),
+        inputs.base_orientation.norm() / (response.acting().inputs.base_orientation.norm() * turn),
+        inputs.base_velocity.norm() / (length * rate),
+        inputs.base_angular_velocity.norm() / rate,
+        inputs.tip_force.norm() / force,
+        inputs.tip_moment.norm() * length / rod.stiffness.min(),
+        gravity.norm() * time * time / length,
+    ]
+    .into_iter()
+    .fold(0.0, f64::max)
+}
