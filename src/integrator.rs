@@ -20,6 +20,7 @@ use crate::mesh::{Mesh, Origin};
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
 use crate::refine::Refiner;
+use crate::rod::Rod;
 use crate::rosenbrock::{RODAS4, RODAS5P};
 use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
 use crate::stepper::{Attempt, Diverged, Reason, Stepper, singular};
@@ -411,6 +412,40 @@ impl Integrator {
             self.restore();
         }
         done
+    }
+
+    /// Takes the damping and drag of `rod` for its own, as those of a state that belongs to them.
+    pub fn take_damping(&mut self, rod: &Rod) {
+        let own = &mut self.stepper.rod;
+        (own.damping, own.drag) = (rod.damping, rod.drag);
+        if let Some(Planar { plane, .. }) = &mut self.planar {
+            plane.take_damping(rod);
+        }
+    }
+
+    /// Takes the damping and drag of `rod` from now on: accelerations follow at once.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the equations of a cell are singular; the rod is as before.
+    pub fn damp(&mut self, rod: &Rod) -> Result<(), Diverged> {
+        let before = self.stepper.rod.clone();
+        self.take_damping(rod);
+        let started = match (self.way, &mut self.planar) {
+            (Way::Accurate { .. }, Some(Planar { plane, .. })) if self.in_plane => {
+                let drive = *plane.drive();
+                plane.start(&drive).map_err(singular)
+            }
+            (Way::Accurate { .. }, _) => {
+                let boundary = self.stepper.state.boundary;
+                self.stepper.accelerate(&boundary)
+            }
+            // their histories are of positions and velocities
+            (Way::Equal | Way::Static, _) => Ok(()),
+        };
+        if started.is_err() {
+            self.take_damping(&before);
+        }
+        started
     }
 
     fn keep(&mut self) {
@@ -851,8 +886,8 @@ impl Integrator {
         Ok(Course { begin, events: again.events.unwrap_or_default(), duration })
     }
 
-    /// The rod started anew under `boundary`, on the cells that it has: in equilibrium if it `rests`, else with its rest
-    /// shape.
+    /// The rod started anew under `boundary`, on the cells and with the damping that it has: in equilibrium if it `rests`,
+    /// else with its rest shape.
     ///
     /// # Errors
     /// [`Diverged`] if there is no such start near the present state.
@@ -1036,13 +1071,21 @@ impl Course {
         rod.in_plane && self.events.iter().all(in_plane)
     }
 
-    /// The rod at the end of the interval, had it been under another `drive`: in a plane, if it is one that it
-    /// [stays](Self::stays_in_plane) in, else in space, which sees what leads out of it.
+    /// The rod at the end of the interval, had it been under another `drive`, with the damping of another rod if there is
+    /// one: in a plane, if it is one that it [stays](Self::stays_in_plane) in, else in space, which sees what leads out of it.
     ///
     /// # Errors
-    /// [`Failed`] if that is too far from the one it was under.
-    pub fn under(&self, drive: &impl Fn(f64) -> Drive, in_plane: bool) -> Result<Integrator, Failed> {
+    /// [`Failed`] if that is too far from what it was under.
+    pub fn under(
+        &self,
+        drive: &impl Fn(f64) -> Drive,
+        damping: Option<&Rod>,
+        in_plane: bool,
+    ) -> Result<Integrator, Failed> {
         let mut rod = self.begin.clone();
+        if let Some(damping) = damping {
+            rod.damp(damping).map_err(|cause| Failed { time: 0.0, step: 0.0, cause })?;
+        }
         match rod.way {
             Way::Accurate { .. } => {
                 if in_plane {

@@ -568,6 +568,15 @@ impl Plane {
         }
     }
 
+    /// Takes the damping and drag of `rod` for its own.
+    pub(crate) fn take_damping(&mut self, rod: &Rod) {
+        (self.rod.damping, self.rod.drag) = (rod.damping, rod.drag);
+        if let Some(section) = section_in(&self.mesh, &self.rod, &self.drive.boundary.base.rotation, &self.frame.normal)
+        {
+            self.section = section;
+        }
+    }
+
     /// The normal of the only plane that can hold all this; where any can, one with a principal axis of the sections.
     fn normal(&self, state: &State, drive: &Drive) -> Vec3 {
         let Self { mesh, rod, .. } = self;

@@ -11,7 +11,7 @@
 //! which leaves ε⁴ y⁽⁵⁾/30. ε d is a small part of what moves the rod as far as it is long, in the time in which gravity or
 //! stiffness do: so ε⁴ is below the roundings that ε divides.
 
-use crate::unit::{Acting, Error, Inputs, Outputs, Response, Unit};
+use crate::unit::{Acting, Error, Inputs, Outputs, Response, Tunable, Unit};
 use nalgebra::{Vector3, Vector4};
 
 /// Part of what moves the rod as far as it is long.
@@ -27,7 +27,7 @@ pub struct Sensitivity {
     distance: f64,
 }
 
-/// A direction along which nothing acts: to be filled with what is to change, in the units of the inputs and of gravity.
+/// A direction along which nothing acts: to be filled with what is to change, in the units of the inputs and parameters.
 pub fn nowhere() -> Acting {
     let zero = Vector3::zeros();
     Acting {
@@ -39,7 +39,7 @@ pub fn nowhere() -> Acting {
             tip_force: zero,
             tip_moment: zero,
         },
-        gravity: zero,
+        tunable: Tunable::default(),
     }
 }
 
@@ -80,6 +80,7 @@ impl Sensitivity {
 /// What acts, moved by so many of `direction`.
 fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
     let (from, by) = (&acting.inputs, &direction.inputs);
+    let (held, tuned) = (&acting.tunable, &direction.tunable);
     Acting {
         inputs: Inputs {
             base_position: from.base_position + by.base_position * distance,
@@ -89,7 +90,12 @@ fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
             tip_force: from.tip_force + by.tip_force * distance,
             tip_moment: from.tip_moment + by.tip_moment * distance,
         },
-        gravity: acting.gravity + direction.gravity * distance,
+        tunable: Tunable {
+            gravity: held.gravity + tuned.gravity * distance,
+            damping_bending: held.damping_bending + tuned.damping_bending * distance,
+            damping_twist: held.damping_twist + tuned.damping_twist * distance,
+            damping_drag: held.damping_drag + tuned.damping_drag * distance,
+        },
     }
 }
 
@@ -100,11 +106,12 @@ fn size(direction: &Acting, response: &Response) -> f64 {
     let (rod, length) = (parameters.rod(), parameters.length);
     let time = parameters.time(&rod);
     let step = response.duration().map_or(time, |duration| duration.min(time));
-    let weight = (rod.mass_per_length * length + rod.tip_mass) * response.acting().gravity.norm();
+    let mass = rod.mass_per_length * length + rod.tip_mass;
+    let weight = mass * response.acting().tunable.gravity.norm();
     let force = weight.max(rod.stiffness.max() / (length * length));
     let turn = if parameters.base_motion == 1 { (step / time).powi(2) } else { step / time };
     let rate = step / (time * time);
-    let Acting { inputs, gravity } = direction;
+    let Acting { inputs, tunable } = direction;
     [
         inputs.base_position.norm() / (length * turn),
         inputs.base_orientation.norm() / (response.acting().inputs.base_orientation.norm() * turn),
@@ -112,8 +119,11 @@ fn size(direction: &Acting, response: &Response) -> f64 {
         inputs.base_angular_velocity.norm() / rate,
         inputs.tip_force.norm() / force,
         inputs.tip_moment.norm() * length / rod.stiffness.min(),
-        gravity.norm() * time * time / length,
+        tunable.gravity.norm() * time * time / length,
+        tunable.damping_bending / time,
+        tunable.damping_twist / time,
+        tunable.damping_drag * length * time / mass,
     ]
     .into_iter()
-    .fold(0.0, f64::max)
+    .fold(0.0, |most, size| f64::max(most, size.abs()))
 }

@@ -46,7 +46,7 @@ pub struct Parameters {
     pub section_shear_correction: f64,
     /// Curvature and twist of the unstressed rod, body frame, 1/m.
     pub rest_curvature: Vector3<f64>,
-    /// Gravity, world frame, m/s²; may change between steps.
+    /// Gravity, world frame, m/s².
     pub gravity: Vector3<f64>,
     /// Kelvin-Voigt time constant of bending, s.
     pub damping_bending: f64,
@@ -142,6 +142,21 @@ impl Default for Parameters {
         }
     }
 }
+
+/// The parameters that may change between steps, as [`Parameters`] has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tunable {
+    /// m/s².
+    pub gravity: Vector3<f64>,
+    /// s.
+    pub damping_bending: f64,
+    /// s.
+    pub damping_twist: f64,
+    /// N·s/m².
+    pub damping_drag: f64,
+}
+
+archived!(Tunable { gravity, damping_bending, damping_twist, damping_drag });
 
 /// What the host gives at every communication point, world frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -422,7 +437,7 @@ pub struct Unit {
     /// Longest internal step, where the host gives it, s.
     step: Option<f64>,
     quasi_static: bool,
-    gravity: Vector3<f64>,
+    tunable: Tunable,
     path: Path,
     warned: bool,
     outputs: Outputs,
@@ -443,8 +458,8 @@ struct Last {
 pub struct Acting {
     /// The inputs.
     pub inputs: Inputs,
-    /// Gravity, world frame, m/s².
-    pub gravity: Vector3<f64>,
+    /// What else may change.
+    pub tunable: Tunable,
 }
 
 /// The outputs as functions of what acts, in the last communication step as it was gone through or, before the first, at
@@ -457,6 +472,18 @@ pub struct Response<'a> {
 }
 
 impl Parameters {
+    /// Those that may change between steps.
+    pub fn tunable(&self) -> Tunable {
+        let Self { gravity, damping_bending, damping_twist, damping_drag, .. } = *self;
+        Tunable { gravity, damping_bending, damping_twist, damping_drag }
+    }
+
+    /// The same with others that may change.
+    pub fn tuned(&self, tunable: &Tunable) -> Self {
+        let Tunable { gravity, damping_bending, damping_twist, damping_drag } = *tunable;
+        Self { gravity, damping_bending, damping_twist, damping_drag, ..self.clone() }
+    }
+
     /// The section's numbers as the library takes them.
     pub fn rod(&self) -> Rod {
         let given = |value: f64, otherwise: f64| if value > 0.0 { value } else { otherwise };
@@ -724,13 +751,13 @@ impl Unit {
         let given = |value: &f64| value.is_finite() && *value > 0.0;
         let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
         let path = start.path(inputs);
-        let boundary = Acting { inputs: inputs.clone(), gravity: parameters.gravity }.on(*path.base());
+        let boundary = Acting { inputs: inputs.clone(), tunable: parameters.tunable() }.on(*path.base());
         Ok(Self {
             integrator: begin(parameters, &boundary, tolerance)?,
             step: (parameters.step > 0.0 || parameters.extensible)
                 .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
             quasi_static: parameters.quasi_static,
-            gravity: parameters.gravity,
+            tunable: parameters.tunable(),
             path,
             warned: false,
             outputs: Outputs::default(),
@@ -757,7 +784,7 @@ impl Unit {
             return Err(Error::NotAllowed { name: "step", value: step, allowed });
         }
         self.last = None;
-        let acting = Acting { inputs: inputs.clone(), gravity: self.gravity };
+        let acting = Acting { inputs: inputs.clone(), tunable: self.tunable };
         let segment = self.path.segment(&inputs.sample(), step_size);
         let done = self.integrator.advance(&acting.along(&segment), step_size);
         done.map_err(|failed| self.failure(failed))?;
@@ -811,9 +838,24 @@ impl Unit {
         })
     }
 
-    /// Sets gravity from the next step on.
-    pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
-        self.gravity = gravity;
+    /// Sets what may change, from the next step on.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] names the first parameter, and [`Error::NoStart`] tells that there are no accelerations with
+    /// such damping; nothing has changed.
+    pub fn tune(&mut self, tunable: &Tunable) -> Result<(), Error> {
+        let before = self.tunable;
+        if *tunable == before {
+            return Ok(());
+        }
+        let parameters = self.start.parameters.tuned(tunable);
+        parameters.validate()?;
+        if *tunable != (Tunable { gravity: tunable.gravity, ..before }) {
+            self.last = None;
+            self.integrator.damp(&parameters.rod()).map_err(Error::NoStart)?;
+        }
+        self.tunable = *tunable;
+        Ok(())
     }
 
     /// The outputs at the present communication point.
@@ -831,7 +873,7 @@ impl Unit {
     /// # Errors
     /// [`Error::NoEquilibrium`] if its stiffness is singular.
     pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
-        let boundary = Boundary::hanging_from(*self.path.base(), self.gravity);
+        let boundary = Boundary::hanging_from(*self.path.base(), self.tunable.gravity);
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
@@ -876,7 +918,7 @@ impl Acting {
         Boundary {
             tip_force: self.inputs.tip_force,
             tip_moment: self.inputs.tip_moment,
-            ..Boundary::hanging_from(base, self.gravity)
+            ..Boundary::hanging_from(base, self.tunable.gravity)
         }
     }
 }
@@ -886,7 +928,7 @@ impl Response<'_> {
     pub fn acting(&self) -> Acting {
         match &self.course {
             Some((_, last)) => last.acting.clone(),
-            None => Acting { inputs: self.unit.start.inputs.clone(), gravity: self.unit.start.parameters.gravity },
+            None => Acting { inputs: self.unit.start.inputs.clone(), tunable: self.unit.start.parameters.tunable() },
         }
     }
 
@@ -905,18 +947,20 @@ impl Response<'_> {
     /// [`Error`] as of [`Unit::new`] and [`Unit::advance`].
     pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
         let Unit { start, outputs, .. } = self.unit;
+        let damping = start.parameters.tuned(&acting.tunable).rod();
         let (rod, path) = match &self.course {
-            Some((course, Last { path, duration, .. })) => {
+            Some((course, Last { path, duration, acting: held })) => {
                 let segment = path.segment(&acting.inputs.sample(), *duration);
-                let rod =
-                    course.under(&acting.along(&segment), in_plane).map_err(|failed| self.unit.failure(failed))?;
-                (rod, segment.into_path())
+                let other = (acting.tunable != held.tunable).then_some(&damping);
+                let rod = course.under(&acting.along(&segment), other, in_plane);
+                (rod.map_err(|failed| self.unit.failure(failed))?, segment.into_path())
             }
             None => {
                 let path = start.path(&acting.inputs);
                 let Parameters { start_in_equilibrium, quasi_static, .. } = start.parameters;
-                let rests = start_in_equilibrium || quasi_static;
-                let rod = self.unit.integrator.restarted(&acting.on(*path.base()), rests);
+                let mut begin = self.unit.integrator.clone();
+                begin.take_damping(&damping);
+                let rod = begin.restarted(&acting.on(*path.base()), start_in_equilibrium || quasi_static);
                 (rod.map_err(Error::NoStart)?, path)
             }
         };
@@ -938,7 +982,7 @@ impl Response<'_> {
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static, last });
+archived!(Unit { integrator, tunable, path, warned, outputs } but { start, step, quasi_static, last });
 
 /// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
 /// for bit as the one that was saved.
@@ -958,9 +1002,11 @@ impl Archived for Option<Box<Unit>> {
             *self = Some(Box::new(room.map_err(|error| Corrupt::Refused { why: error.to_string() })?));
         }
         let Some(unit) = self.as_deref_mut() else { return Ok(()) };
+        unit.visit(archive)?;
         if archive.is_loading() {
             unit.last = None;
+            unit.integrator.take_damping(&unit.start.parameters.tuned(&unit.tunable).rod());
         }
-        unit.visit(archive)
+        Ok(())
     }
 }

@@ -6,7 +6,7 @@ use cosserat_rod::fmi2::host::{Fmu, Slave};
 use cosserat_rod::fmi2::variables::Kind;
 use cosserat_rod::package;
 use cosserat_rod::so3;
-use cosserat_rod::unit::{Inputs, Outputs, Parameters, Unit};
+use cosserat_rod::unit::{Inputs, Outputs, Parameters, Tunable, Unit};
 use nalgebra::Vector3;
 use std::path::Path;
 use std::process::Command;
@@ -137,16 +137,20 @@ fn scenes() -> Vec<Scene> {
     ]
 }
 
-/// Gravity in a step, where a scene changes it.
-fn gravity(scene: &Scene, i: usize) -> Option<Vec3> {
-    (scene.name == "tuned").then(|| scene.parameters.gravity + Vec3::z() * (0.1 * i as f64))
+/// What else acts in a step, where a scene changes it.
+fn tunable(scene: &Scene, i: usize) -> Tunable {
+    let mut tunable = scene.parameters.tunable();
+    if scene.name == "tuned" {
+        tunable.gravity.z += 0.1 * i as f64;
+        tunable.damping_bending = 0.02 + 0.001 * i as f64;
+        tunable.damping_drag = 0.01;
+    }
+    tunable
 }
 
-fn step(unit: &mut Place, inputs: &Inputs, gravity: Option<Vec3>) {
+fn step(unit: &mut Place, inputs: &Inputs, tunable: &Tunable) {
     let unit = unit.as_mut().unwrap();
-    if let Some(gravity) = gravity {
-        unit.set_gravity(gravity);
-    }
+    unit.tune(tunable).unwrap();
     unit.advance(inputs, STEP).unwrap();
 }
 
@@ -159,7 +163,7 @@ fn bytes(unit: &mut Place) -> Vec<u8> {
 /// Outputs and states after each of the steps from `first` on.
 fn run(scene: &Scene, unit: &mut Place, first: usize) -> Vec<(String, Vec<u8>)> {
     let step = |i: usize| {
-        step(unit, &(scene.inputs)(i), gravity(scene, i));
+        step(unit, &(scene.inputs)(i), &tunable(scene, i));
         (format!("{:?}", unit.as_ref().unwrap().outputs()), bytes(unit))
     };
     (first..first + STEPS).map(step).collect()
@@ -170,7 +174,7 @@ fn begun(scene: &Scene) -> (Place, usize) {
     let started = || Some(Box::new(Unit::new(&scene.parameters, &(scene.inputs)(0), None).unwrap()));
     let mut unit = started();
     let mut planar = |i: usize| {
-        step(&mut unit, &(scene.inputs)(i), gravity(scene, i));
+        step(&mut unit, &(scene.inputs)(i), &tunable(scene, i));
         unit.as_ref().unwrap().outputs().solver.planar
     };
     let first = scene.saved_before.unwrap_or_else(|| {
@@ -180,7 +184,7 @@ fn begun(scene: &Scene) -> (Place, usize) {
     });
     let mut unit = started();
     for i in 0..first {
-        step(&mut unit, &(scene.inputs)(i), gravity(scene, i));
+        step(&mut unit, &(scene.inputs)(i), &tunable(scene, i));
     }
     (unit, first)
 }
@@ -215,7 +219,7 @@ fn a_rollback_goes_on_bit_for_bit() {
         // rolled back, twice: after what was done, and after what is to be undone
         for astray in [0, STEPS] {
             for i in first..first + astray {
-                step(&mut unit, &(scene.astray)(i), Some(Vec3::z() * -5.0));
+                step(&mut unit, &(scene.astray)(i), &Tunable { gravity: Vec3::z() * -5.0, ..Tunable::default() });
             }
             note(&outputs(&unit), 1);
             load(&mut unit, &saved).unwrap();

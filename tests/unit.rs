@@ -7,7 +7,7 @@ mod long;
 #[path = "../src/cli/chart/scenes.rs"]
 mod scenes;
 
-use cosserat_rod::unit::{Error, Inputs, Outputs, Parameters, Unit};
+use cosserat_rod::unit::{Error, Inputs, Outputs, Parameters, Tunable, Unit};
 use long::{helix, inputs};
 use nalgebra::{Vector3, Vector4};
 use scenes::Scene;
@@ -196,11 +196,45 @@ fn a_refused_step_changes_nothing() {
 #[test]
 fn gravity_changes_from_the_next_step_on() {
     let mut unit = Unit::new(&Parameters::default(), &Inputs::default(), None).unwrap();
-    unit.set_gravity(Vec3::z() * 9.81);
+    unit.tune(&Tunable { gravity: Vec3::z() * 9.81, ..Parameters::default().tunable() }).unwrap();
     for _ in 0..20 {
         unit.advance(&Inputs::default(), 0.01).unwrap();
     }
     assert!(unit.outputs().tip_position.z > 0.1, "{}", unit.outputs().tip_position);
+}
+
+/// Tuned before the first step, a rod moves as one that has always been so.
+#[test]
+fn damping_changes_from_the_next_step_on() {
+    let pushed = Inputs { tip_force: Vec3::y() * 0.05, ..Inputs::default() };
+    let chosen = Parameters { tolerance: 1e-5, ..Parameters::default() };
+    let equal = Parameters { step: 0.002, ..Parameters::default() };
+    for (parameters, inputs) in [(&chosen, Inputs::default()), (&chosen, pushed.clone()), (&equal, pushed)] {
+        let damped = Tunable { damping_bending: 0.1, damping_twist: 0.2, damping_drag: 0.05, ..parameters.tunable() };
+        let mut tuned = Unit::new(parameters, &inputs, None).unwrap();
+        let mut always = Unit::new(&parameters.tuned(&damped), &inputs, None).unwrap();
+        let mut never = tuned.clone();
+        tuned.tune(&damped).unwrap();
+        for _ in 0..30 {
+            for unit in [&mut tuned, &mut always, &mut never] {
+                unit.advance(&inputs, 0.01).unwrap();
+            }
+        }
+        let tip = |unit: &Unit| unit.outputs().tip_position;
+        // at rest and unstressed nothing is damped yet
+        assert!((tip(&tuned) - tip(&always)).norm() < 1e-9, "{} and {}", tip(&tuned), tip(&always));
+        assert!((tip(&tuned) - tip(&never)).norm() > 0.02, "{} and {}", tip(&tuned), tip(&never));
+        // the balance counts what is lost, to the error of the equal steps
+        let energy = &tuned.outputs().energy;
+        let residual = energy.total() + energy.dissipated - energy.work_base - energy.work_tip;
+        assert!(energy.dissipated > 0.01 && residual.abs() < 0.02 * energy.dissipated, "{energy:?}");
+    }
+    let mut unit = Unit::new(&chosen, &Inputs::default(), None).unwrap();
+    let before = format!("{unit:?}");
+    let bad = Tunable { damping_twist: -1.0, ..chosen.tunable() };
+    let error = unit.tune(&bad).unwrap_err().to_string();
+    assert_eq!(error, "damping.twist = -1 is not allowed: finite and >= 0");
+    assert_eq!(format!("{unit:?}"), before);
 }
 
 #[test]

@@ -281,8 +281,8 @@ impl Experiment {
             let step = (time - clock) + (end - time);
             clock = time + (end - time);
             let now = apply(time, &mut parameters);
-            unit.set_gravity(parameters.gravity);
-            let warning = unit.advance(&now, step).map_err(|error| Error::Diverged { time, error })?;
+            let warning = (unit.tune(&parameters.tunable()).and_then(|()| unit.advance(&now, step)))
+                .map_err(|error| Error::Diverged { time, error })?;
             tell(end, unit.outputs(), warning)?;
         }
         Ok(())

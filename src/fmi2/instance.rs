@@ -632,8 +632,6 @@ impl Instance {
         }
         if self.now.mode != Mode::StepComplete {
             self.now.unit = None;
-        } else if let Some(unit) = &mut self.now.unit {
-            unit.set_gravity(self.now.parameters.gravity);
         }
         Ok(None)
     }
@@ -658,8 +656,8 @@ impl Instance {
             if variable.is_output() { Ok(variable) } else { Err(Failure::NotUnknown { variable }) }
         });
         let unknown = unknown.collect::<Result<Vec<_>, _>>()?;
-        let Acting { mut inputs, gravity } = sensitivity::nowhere();
-        let mut parameters = Parameters { gravity, ..Parameters::default() };
+        let Acting { mut inputs, tunable } = sensitivity::nowhere();
+        let mut parameters = Parameters::default().tuned(&tunable);
         for (&reference, &part) in known.iter().zip(direction) {
             let variable = self.variable(reference, Kind::Real)?;
             if !variable.is_settable_while_stepping() {
@@ -671,7 +669,7 @@ impl Instance {
             let sum = variable.given(&mut parameters, &mut inputs).unwrap_or_default() + part;
             variable.set(&mut parameters, &mut inputs, sum);
         }
-        let direction = Acting { inputs, gravity: parameters.gravity };
+        let direction = Acting { inputs, tunable: parameters.tunable() };
         let sensitivity = Sensitivity::new(self.unit()?, &direction)?;
         for (variable, derivative) in unknown.iter().zip(derivatives) {
             *derivative = sensitivity.of(|outputs| variable.computed(outputs).unwrap_or_default());
@@ -693,10 +691,11 @@ impl Instance {
         if let Some(stop) = self.now.experiment.stop.filter(|stop| end > stop + near) {
             return Err(Failure::PastStopTime { end, stop });
         }
-        let inputs = self.now.inputs.clone();
+        let (inputs, tunable) = (self.now.inputs.clone(), self.now.parameters.tunable());
         let own_step = (time - self.now.time) + step_size;
         let unit = self.unit()?;
         let retries = unit.outputs().solver.retries;
+        unit.tune(&tunable)?;
         let warning = unit.advance(&inputs, own_step)?;
         let retries = unit.outputs().solver.retries - retries;
         self.now.time = end;
