@@ -15,7 +15,7 @@ use crate::rod::Rod;
 use crate::runge_kutta::{self, RungeKutta};
 use crate::so3;
 use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System, larger};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
 /// Newton's iterations before the step is given up; a step that resolves the motion takes 3 to 5.
@@ -810,6 +810,31 @@ impl Stepper {
         self.trial.dt = 0.0;
         std::mem::swap(&mut self.state, &mut self.trial);
         Ok(())
+    }
+
+    /// How much of the rod the base feels at once, kg, world frame: the force on the base is less by this times what the
+    /// acceleration of the base is more. Zero for a rod that shears or stretches, whose centreline follows later.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Self::start`]; the state is as before in any case.
+    pub fn effective_mass(&mut self) -> Result<Matrix3<f64>, Diverged> {
+        let mut mass = Matrix3::zeros();
+        if self.rod.is_extensible() {
+            return Ok(mass);
+        }
+        let Self { mesh, rod, state, system, sweep, trial, .. } = self;
+        trial.copy_from(state);
+        pose::assemble_accelerations(mesh, rod, trial, &state.boundary, system);
+        sweep.solve(system).map_err(singular)?;
+        let still = sweep.nodes[0].n;
+        for i in 0..3 {
+            let mut pushed = state.boundary;
+            pushed.base.acceleration[i] += 1.0;
+            pose::assemble_accelerations(mesh, rod, trial, &pushed, system);
+            sweep.solve_for(&system.residuals);
+            mass.set_column(i, &(still - sweep.nodes[0].n));
+        }
+        Ok(mass)
     }
 
     fn solve_accelerations(&mut self, boundary: &Boundary) -> Result<(), Diverged> {

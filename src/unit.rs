@@ -16,7 +16,7 @@ use crate::refine::Refiner;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{Matrix3, Vector3, Vector4};
 use std::f64::consts::PI;
 use std::{fmt, mem};
 
@@ -78,6 +78,8 @@ pub struct Parameters {
     pub planar: bool,
     /// No inertia and no damping: from one equilibrium to the next.
     pub quasi_static: bool,
+    /// The effective mass is among the outputs.
+    pub effective_mass: bool,
 }
 
 archived!(Parameters {
@@ -107,6 +109,7 @@ archived!(Parameters {
     start_in_equilibrium,
     planar,
     quasi_static,
+    effective_mass,
 });
 
 impl Default for Parameters {
@@ -139,6 +142,7 @@ impl Default for Parameters {
             start_in_equilibrium: false,
             planar: true,
             quasi_static: false,
+            effective_mass: false,
         }
     }
 }
@@ -214,6 +218,10 @@ pub struct Outputs {
     pub power_base: f64,
     /// Rate of `energy.work_tip`, under the load of the step that ends here, W.
     pub power_tip: f64,
+    /// Acceleration of the base at the end of the step, m/s².
+    pub base_acceleration: Vector3<f64>,
+    /// How much of the rod the base feels at once ([`Stepper::effective_mass`]), kg; zero where it is not asked for.
+    pub effective_mass: Matrix3<f64>,
     /// Cells in use.
     pub cells: i32,
     /// What it took since the start.
@@ -231,6 +239,8 @@ archived!(Outputs {
     energy,
     power_base,
     power_tip,
+    base_acceleration,
+    effective_mass,
     cells,
     solver
 });
@@ -472,6 +482,11 @@ pub struct Response<'a> {
 }
 
 impl Parameters {
+    /// Whether the effective mass is wanted, and there is inertia.
+    fn wants_masses(&self) -> bool {
+        self.effective_mass && !self.quasi_static
+    }
+
     /// Those that may change between steps.
     pub fn tunable(&self) -> Tunable {
         let Self { gravity, damping_bending, damping_twist, damping_drag, .. } = *self;
@@ -878,13 +893,14 @@ impl Unit {
     }
 
     fn read_out(&mut self, inputs: &Inputs) {
-        self.outputs.read(&self.integrator, self.path.base(), inputs);
+        let masses = self.start.parameters.wants_masses();
+        self.outputs.read(&mut self.integrator, self.path.base(), inputs, masses);
     }
 }
 
 impl Outputs {
-    /// What is to be read of a rod on this base, after a step with these inputs.
-    fn read(&mut self, integrator: &Integrator, base: &Support, inputs: &Inputs) {
+    /// What is to be read of a rod on this base, after a step with these inputs; its effective mass if `masses` are wanted.
+    fn read(&mut self, integrator: &mut Integrator, base: &Support, inputs: &Inputs, masses: bool) {
         let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
         *self = Self {
             tip_position: position,
@@ -896,11 +912,16 @@ impl Outputs {
             energy: *integrator.energy(),
             power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
             power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
+            base_acceleration: base.acceleration,
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
             ..*self
         };
         integrator.centreline(&mut self.stations);
+        if masses {
+            // a rod that has moved has accelerations
+            self.effective_mass = integrator.in_space().effective_mass().unwrap_or_default();
+        }
     }
 }
 
@@ -948,7 +969,7 @@ impl Response<'_> {
     pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
         let Unit { start, outputs, .. } = self.unit;
         let damping = start.parameters.tuned(&acting.tunable).rod();
-        let (rod, path) = match &self.course {
+        let (mut rod, path) = match &self.course {
             Some((course, Last { path, duration, acting: held })) => {
                 let segment = path.segment(&acting.inputs.sample(), *duration);
                 let other = (acting.tunable != held.tunable).then_some(&damping);
@@ -966,7 +987,7 @@ impl Response<'_> {
         };
         let mut outputs = outputs.clone();
         let Outputs { solver, cells, .. } = outputs;
-        outputs.read(&rod, path.base(), &acting.inputs);
+        outputs.read(&mut rod, path.base(), &acting.inputs, start.parameters.wants_masses());
         Ok(Outputs { solver, cells, ..outputs })
     }
 

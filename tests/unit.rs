@@ -203,6 +203,51 @@ fn gravity_changes_from_the_next_step_on() {
     assert!(unit.outputs().tip_position.z > 0.1, "{}", unit.outputs().tip_position);
 }
 
+#[test]
+fn the_effective_mass_is_what_the_base_feels() {
+    let hanging = Inputs { base_orientation: Vector4::new(0.0, 1.0, 0.0, 0.0), ..Inputs::default() };
+    let parameters =
+        Parameters { effective_mass: true, tip_mass: 0.02, start_in_equilibrium: true, ..Parameters::default() };
+    let unit = Unit::new(&parameters, &hanging, None).unwrap();
+    let weight = unit.outputs().base_reaction_force;
+    let mass = unit.outputs().effective_mass;
+    // it hangs, and moves along itself as one body, whose weight the base feels; across, it swings
+    assert!((mass * Vec3::z() + Vec3::z() * (weight.z / 9.81)).norm() < 1e-9, "{mass} {weight}");
+    assert!(mass.m11 > 0.0 && mass.m22 > 0.0 && mass.m11.max(mass.m22) < 0.2 * mass.m33, "{mass}");
+
+    // in a plane and out of it
+    for push in [Vec3::zeros(), Vec3::y() * 0.05] {
+        let released = Parameters { start_in_equilibrium: false, ..parameters.clone() };
+        let inputs = Inputs { tip_force: push, ..Inputs::default() };
+        let mut unit = Unit::new(&released, &inputs, None).unwrap();
+        for _ in 0..20 {
+            unit.advance(&inputs, 0.01).unwrap();
+        }
+        assert_eq!(unit.outputs().solver.planar, push == Vec3::zeros());
+        let mass = unit.outputs().effective_mass;
+        let scale = mass.norm();
+        assert!((mass - mass.transpose()).norm() < 1e-9 * scale && mass.symmetric_eigenvalues().min() > 0.0, "{mass}");
+        for change in [Vec3::x(), Vec3::new(0.3, -2.0, 1.0)] {
+            let reaction = |acceleration: Vec3| {
+                let mut stepper = unit.clone().stepper().clone();
+                let mut boundary = stepper.state.boundary;
+                boundary.base.acceleration += acceleration;
+                stepper.accelerate(&boundary).unwrap();
+                stepper.state.nodes[0].force
+            };
+            let felt = reaction(change) - reaction(Vec3::zeros());
+            assert!((felt + mass * change).norm() < 1e-9 * scale, "{felt} and {}", mass * change);
+        }
+    }
+    for without in [
+        Parameters::default(),
+        Parameters { extensible: true, ..parameters.clone() },
+        Parameters { quasi_static: true, ..parameters.clone() },
+    ] {
+        assert_eq!(Unit::new(&without, &hanging, None).unwrap().outputs().effective_mass.norm(), 0.0);
+    }
+}
+
 /// Tuned before the first step, a rod moves as one that has always been so.
 #[test]
 fn damping_changes_from_the_next_step_on() {

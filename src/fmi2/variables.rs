@@ -235,6 +235,7 @@ const fn array(
 
 const XYZ: &[&str] = &["x", "y", "z"];
 const WXYZ: &[&str] = &["w", "x", "y", "z"];
+const MATRIX: &[&str] = &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"];
 const DIRECTORS: &[&str] = &["d1", "d2", "d3"];
 
 /// What only the passage of time makes felt. The shape at the start, and what follows from it, does not depend on it.
@@ -247,11 +248,14 @@ const SHAPE: Initially = Initially::AllBut(&[
     "step",
     "spectral_radius",
     "planar",
+    "effective_mass",
     "base.velocity",
     "base.angular_velocity",
 ]);
 /// Damping and the start in motion reach the accelerations, and these the reaction; only the time steps do not.
-const START: Initially = Initially::AllBut(&["step", "spectral_radius", "planar"]);
+const START: Initially = Initially::AllBut(&["step", "spectral_radius", "planar", "effective_mass"]);
+/// The same where it is wanted at all.
+const MASS: Initially = Initially::AllBut(&["step", "spectral_radius", "planar"]);
 
 use Slot::{BooleanOutput, BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
 
@@ -311,6 +315,8 @@ pub static ROWS: &[Row] = &[
         "Whether the rod may be computed in a plane as long as it lies and moves in one, and all that acts on it leaves it there"),
     scalar("quasi_static", "", BooleanParameter(|p| &mut p.quasi_static),
         "Whether the rod goes from one static equilibrium to the next, without inertia and damping; it starts from one, and loads go steadily from their last values to the new ones in every communication step"),
+    scalar("effective_mass", "", BooleanParameter(|p| &mut p.effective_mass),
+        "Whether coupling.effective_mass is computed at every communication point"),
 
     array("base.position", "m", XYZ, Input(|i, k| &mut i.base_position[k]),
         "Position of the base point, world frame"),
@@ -356,6 +362,10 @@ pub static ROWS: &[Row] = &[
         "Power that the base puts into the rod, the rate of energy.work_base"),
     scalar("coupling.power_tip", "W", Output(|o, _| o.power_tip, START),
         "Power that the tip force and moment of the step that ends here put into the rod, the rate of energy.work_tip"),
+    array("coupling.base_acceleration", "m/s2", XYZ, Output(|o, k| o.base_acceleration[k], Initially::Constant),
+        "Acceleration of the base point on its path at the end of the step, world frame"),
+    array("coupling.effective_mass", "kg", MATRIX, Output(|o, k| o.effective_mass[(k / 3, k % 3)], MASS),
+        "How much of the rod the base feels at once: base.reaction_force changes by minus this times a change of the acceleration of the base point, world frame, row by row; 0 unless the parameter effective_mass is true, and for a rod that is extensible"),
     scalar("solver.steps", "", IntegerOutput(|o| o.solver.steps, Initially::Constant),
         "Internal steps since the start"),
     scalar("solver.iterations", "", IntegerOutput(|o| o.solver.iterations, START),
