@@ -78,5 +78,9 @@ fn the_default_rod_moves_as_in_the_library() {
             instance.do_step(time, next[0] - time, true).unwrap();
         }
     }
+    let (tip, force) = (reference("tip.position[2]", "Output", "Real"), reference("tip.force[2]", "Input", "Real"));
+    let mut yields = [0.0];
+    instance.get_directional_derivative(&[tip.unwrap()], &[force.unwrap()], &[1.0], &mut yields).unwrap();
+    assert!(yields[0] > 0.0, "{yields:?}");
     instance.terminate().unwrap();
 }
