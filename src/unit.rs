@@ -13,6 +13,7 @@ use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
 use crate::pose::State;
 use crate::refine::Refiner;
+use crate::rest::RestShape;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
@@ -44,7 +45,7 @@ pub struct Parameters {
     pub section_torsion_constant: f64,
     /// Shear correction factor, used when `extensible`.
     pub section_shear_correction: f64,
-    /// Curvature and twist of the unstressed rod, body frame, 1/m.
+    /// Curvature and twist of the unstressed rod, added to those of its rest shape, body frame, 1/m.
     pub rest_curvature: Vector3<f64>,
     /// Gravity, world frame, m/s²; may change between steps.
     pub gravity: Vector3<f64>,
@@ -78,6 +79,8 @@ pub struct Parameters {
     pub planar: bool,
     /// No inertia and no damping: from one equilibrium to the next.
     pub quasi_static: bool,
+    /// What is not the same all along the unstressed rod; not to be set by the host.
+    pub rest_shape: RestShape,
 }
 
 archived!(Parameters {
@@ -107,6 +110,7 @@ archived!(Parameters {
     start_in_equilibrium,
     planar,
     quasi_static,
+    rest_shape,
 });
 
 impl Default for Parameters {
@@ -139,6 +143,7 @@ impl Default for Parameters {
             start_in_equilibrium: false,
             planar: true,
             quasi_static: false,
+            rest_shape: RestShape::default(),
         }
     }
 }
@@ -491,15 +496,20 @@ impl Parameters {
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
     fn mesh(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
         let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
-        let turn = self.rest_curvature.norm() * self.length;
-        let uniform = |cells: usize| Mesh::uniform(self.length, cells, stages, self.rest_curvature);
+        let (shape, more) = (&self.rest_shape, &self.rest_curvature);
+        let turn = shape.turn(self.length, more);
         if self.cells > 0 {
-            if turn >= MAX_CELL_TURN * f64::from(self.cells) {
-                let allowed = Allowed::Such("as many that the rest curvature turns less than 3 rad in each");
-                return Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
+            let mesh = shape.mesh(self.length, more, self.cells as usize, f64::INFINITY, stages);
+            let not_allowed = |allowed| Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
+            if mesh.cells.len() > self.cells as usize {
+                return not_allowed(Allowed::Such("0, or at least one for each piece of the rest shape"));
             }
-            return Ok((uniform(self.cells as usize), None));
+            if mesh.cells.iter().any(|cell| cell.kappa_rest.norm() * cell.length >= MAX_CELL_TURN) {
+                return not_allowed(Allowed::Such("as many that the rest curvature turns less than 3 rad in each"));
+            }
+            return Ok((mesh, None));
         }
+        let in_cells = |cells: usize| shape.mesh(self.length, more, cells, COARSEST_TURN, stages);
         // loads bend a rod within (EI/w)^(1/3) of where it is held
         let load = rod.mass_per_length * self.gravity.norm()
             + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
@@ -514,12 +524,13 @@ impl Parameters {
         if self.extensible || self.step > 0.0 || self.quasi_static {
             // measured on a rope of seven such lengths, five cells of four points are right to 3e-4
             let cells = at_least(0.7 * bends * (1e-3 / tolerance).powf(1.0 / order));
-            return Ok((uniform(cells.max(turn) as usize), None));
+            return Ok((in_cells(cells.max(turn) as usize), None));
         }
         // equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent
         let likely = at_least(0.3 * bends * (1e-2 / tolerance).powf(1.8 / order));
-        let coarsest = uniform((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
+        let coarsest = in_cells((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let most = likely.max(turn).max(coarsest.cells.len() as f64);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
         Ok((refiner.start(likely as usize), Some(refiner)))
     }
