@@ -3,6 +3,7 @@
 mod cli;
 
 use clap::{Parser, Subcommand};
+use cosserat_rod::fmi2::model::Model;
 use cosserat_rod::package;
 use std::error::Error;
 use std::io;
@@ -54,7 +55,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
         Command::Package { output } => {
-            package::package(&output)?;
+            package::package(&output, &Model::default())?;
             println!("{}", output.display());
             Ok(())
         }
