@@ -8,6 +8,10 @@ pub mod terminals;
 
 pub mod documentation;
 
+pub mod centreline;
+
+pub mod rod_file;
+
 use crate::fmi2::model::{self, Model};
 use crate::fmi2::{description, host};
 use std::io::{self, Write};
