@@ -176,6 +176,16 @@ impl<T: Archived + Clone + Default> Archived for Vec<T> {
     }
 }
 
+/// Its bytes, as they are in UTF-8.
+impl Archived for String {
+    fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
+        let mut bytes = std::mem::take(self).into_bytes();
+        bytes.visit(archive)?;
+        *self = Self::from_utf8(bytes).map_err(|error| Corrupt::Refused { why: error.to_string() })?;
+        Ok(())
+    }
+}
+
 impl<A: Archived, B: Archived> Archived for (A, B) {
     fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
         self.0.visit(archive)?;
@@ -219,17 +229,19 @@ mod tests {
         count: u32,
         yes: bool,
         limit: Option<f64>,
+        name: String,
         list: Vec<(Vector3<f64>, i32)>,
         matrix: Matrix3<f64>,
         scratch: u8,
     }
 
-    archived!(Thing { number, count, yes, limit, list, matrix } but { scratch });
+    archived!(Thing { number, count, yes, limit, name, list, matrix } but { scratch });
 
     fn thing() -> Thing {
         let list = vec![(Vector3::new(1.0, -0.0, f64::MIN_POSITIVE), -7); 3];
         let matrix = Matrix3::from_fn(|i, j| (3 * i + j) as f64);
-        Thing { number: 0.1, count: 5, yes: true, limit: Some(f64::INFINITY), list, matrix, scratch: 9 }
+        let (limit, name) = (Some(f64::INFINITY), "κ".to_owned());
+        Thing { number: 0.1, count: 5, yes: true, limit, name, list, matrix, scratch: 9 }
     }
 
     #[test]
@@ -237,7 +249,7 @@ mod tests {
         let (mut saved, mut bytes) = (thing(), vec![1]);
         save(&mut saved, &mut bytes);
         assert_eq!(saved, thing());
-        assert_eq!(bytes.len(), 8 + 4 + 1 + 9 + 8 + 3 * 28 + 72);
+        assert_eq!(bytes.len(), 8 + 4 + 1 + 9 + 10 + 8 + 3 * 28 + 72);
         assert_eq!(bytes[..8], 0.1f64.to_le_bytes());
         let mut loaded = Thing::default();
         load(&mut loaded, &bytes).unwrap();
@@ -253,10 +265,12 @@ mod tests {
             assert_eq!(load(&mut Thing::default(), &bytes[..length]), Err(Corrupt::TooShort), "{length}");
         }
         let mut endless = bytes.clone();
-        endless[22..30].fill(0xff);
+        endless[32..40].fill(0xff);
         assert_eq!(load(&mut Thing::default(), &endless), Err(Corrupt::TooShort));
         bytes.extend([0; 5]);
         assert_eq!(load(&mut Thing::default(), &bytes), Err(Corrupt::TooLong { left: 5 }));
+        bytes[30] = 0xff;
+        assert!(matches!(load(&mut Thing::default(), &bytes), Err(Corrupt::Refused { .. })));
         bytes[12] = 2;
         assert_eq!(load(&mut Thing::default(), &bytes), Err(Corrupt::NoChoice { given: 2, choices: 2 }));
     }

@@ -13,7 +13,7 @@
 //! host =C=> fmi2 -> sensitivity -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
 //!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
 //!      examples, tests -> rate -> formulation -> {energy, stepper}
-//!                       pose, rate -> {alpha, boundary, rod, mesh, archive, so3}
+//!                       pose, rate -> {alpha, boundary, rod, mesh, archive, so3},  unit -> rest -> mesh
 //! ```
 //!
 //! The rod is formulated twice, on the same rods, meshes, ends, time schemes and rotations: by [`pose`], which
@@ -58,6 +58,7 @@
 pub mod so3;
 pub mod archive;
 pub mod mesh;
+pub mod rest;
 pub mod rod;
 pub mod sweep;
 pub mod alpha;

@@ -3,10 +3,10 @@
 mod cli;
 
 use clap::{Parser, Subcommand};
-use cosserat_rod::package;
+use cosserat_rod::package::{self, rod_file};
 use std::error::Error;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// One elastic rod as an FMI 2.0 co-simulation unit.
@@ -21,9 +21,11 @@ struct Arguments {
 enum Command {
     /// Packages the library and its description as an FMU.
     Package {
-        /// Where to write the FMU.
-        #[arg(short, long, default_value = "target/CosseratRod.fmu")]
-        output: PathBuf,
+        /// A rod of its own name, shape and start values (TOML, see examples/coil_hose.toml); without it, the unit itself.
+        rod: Option<PathBuf>,
+        /// Where to write the FMU; without it, to target/ under the name of the model.
+        #[arg(short, long)]
+        output: Option<PathBuf>,
     },
     /// Tells what is in an FMU: model, platforms, capabilities, parameters.
     Info(cli::info::Arguments),
@@ -53,8 +55,10 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
-        Command::Package { output } => {
-            package::package(&output)?;
+        Command::Package { rod, output } => {
+            let model = rod.as_deref().map(rod_file::read).transpose()?.unwrap_or_default();
+            let output = output.unwrap_or_else(|| Path::new("target").join(format!("{}.fmu", model.name)));
+            package::package(&output, &model)?;
             println!("{}", output.display());
             Ok(())
         }

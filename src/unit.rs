@@ -13,6 +13,7 @@ use crate::modes::{self, Mode};
 use crate::path::{Given, Path, Sample, Segment};
 use crate::pose::State;
 use crate::refine::Refiner;
+use crate::rest::RestShape;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
@@ -44,7 +45,7 @@ pub struct Parameters {
     pub section_torsion_constant: f64,
     /// Shear correction factor, used when `extensible`.
     pub section_shear_correction: f64,
-    /// Curvature and twist of the unstressed rod, body frame, 1/m.
+    /// Curvature and twist of the unstressed rod, added to those of its rest shape, body frame, 1/m.
     pub rest_curvature: Vector3<f64>,
     /// Gravity, world frame, m/s².
     pub gravity: Vector3<f64>,
@@ -80,6 +81,8 @@ pub struct Parameters {
     pub quasi_static: bool,
     /// The effective mass is among the outputs.
     pub effective_mass: bool,
+    /// What is not the same all along the unstressed rod; not to be set by the host.
+    pub rest_shape: RestShape,
 }
 
 archived!(Parameters {
@@ -110,6 +113,7 @@ archived!(Parameters {
     planar,
     quasi_static,
     effective_mass,
+    rest_shape,
 });
 
 impl Default for Parameters {
@@ -143,6 +147,7 @@ impl Default for Parameters {
             planar: true,
             quasi_static: false,
             effective_mass: false,
+            rest_shape: RestShape::default(),
         }
     }
 }
@@ -481,6 +486,38 @@ pub struct Response<'a> {
     course: Option<(Course, &'a Last)>,
 }
 
+/// Name and value of a parameter, and what it may be.
+type Number = (&'static str, f64, Allowed);
+
+fn allow(mut numbers: impl Iterator<Item = Number>) -> Result<(), Error> {
+    match numbers.find(|(_, value, allowed)| !allowed.contains(*value)) {
+        Some((name, value, allowed)) => Err(Error::NotAllowed { name, value, allowed }),
+        None => Ok(()),
+    }
+}
+
+impl Tunable {
+    fn numbers(&self) -> impl Iterator<Item = Number> + use<> {
+        use Allowed::{Finite, NonNegative};
+        let g = self.gravity;
+        let numbers = [
+            ("gravity[1]", g.x, Finite),
+            ("gravity[2]", g.y, Finite),
+            ("gravity[3]", g.z, Finite),
+            ("damping.bending", self.damping_bending, NonNegative),
+            ("damping.twist", self.damping_twist, NonNegative),
+            ("damping.drag", self.damping_drag, NonNegative),
+        ];
+        numbers.into_iter()
+    }
+
+    /// The rod with this damping.
+    fn damped(&self, rod: Rod) -> Rod {
+        let damping = Vector3::new(self.damping_bending, self.damping_bending, self.damping_twist);
+        Rod { damping, drag: self.damping_drag, ..rod }
+    }
+}
+
 impl Parameters {
     /// Whether the effective mass is wanted, and there is inertia.
     fn wants_masses(&self) -> bool {
@@ -508,24 +545,24 @@ impl Parameters {
         let torsion = given(self.section_torsion_constant, i_1 + i_2);
         let (e, g, rho) = (self.youngs_modulus, self.shear_modulus, self.density);
         let shear = 1.0 / (self.section_shear_correction * g * area);
-        Rod {
+        self.tunable().damped(Rod {
             stiffness: Vector3::new(e * i_1, e * i_2, g * torsion),
             compliance: if self.extensible { Vector3::new(shear, shear, 1.0 / (e * area)) } else { Vector3::zeros() },
             mass_per_length: rho * area,
             inertia_per_length: Vector3::new(i_1, i_2, i_1 + i_2) * rho,
-            damping: Vector3::new(self.damping_bending, self.damping_bending, self.damping_twist),
-            drag: self.damping_drag,
+            damping: Vector3::zeros(),
+            drag: 0.0,
             tip_mass: self.tip_mass,
             tip_inertia: self.tip_inertia,
-        }
+        })
     }
 
     /// Every number among the parameters: its name, its value and what it may be.
-    fn numbers(&self) -> [(&'static str, f64, Allowed); 27] {
+    fn numbers(&self) -> impl Iterator<Item = Number> + use<> {
         use Allowed::{Between, Choice, Finite, NonNegative, Positive};
         let [i_1, i_2] = self.section_second_moment;
-        let (kappa, g) = (self.rest_curvature, self.gravity);
-        [
+        let kappa = self.rest_curvature;
+        let fixed = [
             ("length", self.length, Positive),
             ("radius", self.radius, Positive),
             ("density", self.density, Positive),
@@ -539,12 +576,6 @@ impl Parameters {
             ("rest_curvature[1]", kappa.x, Finite),
             ("rest_curvature[2]", kappa.y, Finite),
             ("rest_curvature[3]", kappa.z, Finite),
-            ("gravity[1]", g.x, Finite),
-            ("gravity[2]", g.y, Finite),
-            ("gravity[3]", g.z, Finite),
-            ("damping.bending", self.damping_bending, NonNegative),
-            ("damping.twist", self.damping_twist, NonNegative),
-            ("damping.drag", self.damping_drag, NonNegative),
             ("tip.mass", self.tip_mass, NonNegative),
             ("tip.inertia", self.tip_inertia, NonNegative),
             ("base.motion", f64::from(self.base_motion), Choice(0, 2)),
@@ -553,13 +584,14 @@ impl Parameters {
             ("step", self.step, NonNegative),
             ("tolerance", self.tolerance, NonNegative),
             ("spectral_radius", self.spectral_radius, Between(0.0, 1.0)),
-        ]
+        ];
+        fixed.into_iter().chain(self.tunable().numbers())
     }
 
     /// What the parameter `name` may be.
     pub fn allowed(name: &str) -> Allowed {
-        let numbers = Self::default().numbers();
-        numbers.iter().find(|(known, ..)| *known == name).map_or(Allowed::Finite, |(_, _, allowed)| *allowed)
+        let mut numbers = Self::default().numbers();
+        numbers.find(|(known, ..)| *known == name).map_or(Allowed::Finite, |(_, _, allowed)| allowed)
     }
 
     /// Refuses what no rod can have.
@@ -567,10 +599,7 @@ impl Parameters {
     /// # Errors
     /// [`Error::NotAllowed`] names the first parameter.
     pub fn validate(&self) -> Result<(), Error> {
-        match self.numbers().into_iter().find(|(_, value, allowed)| !allowed.contains(*value)) {
-            Some((name, value, allowed)) => Err(Error::NotAllowed { name, value, allowed }),
-            None => Ok(()),
-        }
+        allow(self.numbers())
     }
 
     /// The cells to begin with, and what refines them where they are not given.
@@ -579,15 +608,20 @@ impl Parameters {
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
     fn mesh(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
         let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
-        let turn = self.rest_curvature.norm() * self.length;
-        let uniform = |cells: usize| Mesh::uniform(self.length, cells, stages, self.rest_curvature);
+        let (shape, more) = (&self.rest_shape, &self.rest_curvature);
+        let turn = shape.turn(self.length, more);
         if self.cells > 0 {
-            if turn >= MAX_CELL_TURN * f64::from(self.cells) {
-                let allowed = Allowed::Such("as many that the rest curvature turns less than 3 rad in each");
-                return Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
+            let mesh = shape.mesh(self.length, more, self.cells as usize, f64::INFINITY, stages);
+            let not_allowed = |allowed| Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
+            if mesh.cells.len() > self.cells as usize {
+                return not_allowed(Allowed::Such("0, or at least one for each piece of the rest shape"));
             }
-            return Ok((uniform(self.cells as usize), None));
+            if mesh.cells.iter().any(|cell| cell.kappa_rest.norm() * cell.length >= MAX_CELL_TURN) {
+                return not_allowed(Allowed::Such("as many that the rest curvature turns less than 3 rad in each"));
+            }
+            return Ok((mesh, None));
         }
+        let in_cells = |cells: usize| shape.mesh(self.length, more, cells, COARSEST_TURN, stages);
         // loads bend a rod within (EI/w)^(1/3) of where it is held
         let load = rod.mass_per_length * self.gravity.norm()
             + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
@@ -602,12 +636,13 @@ impl Parameters {
         if self.extensible || self.step > 0.0 || self.quasi_static {
             // measured on a rope of seven such lengths, five cells of four points are right to 3e-4
             let cells = at_least(0.7 * bends * (1e-3 / tolerance).powf(1.0 / order));
-            return Ok((uniform(cells.max(turn) as usize), None));
+            return Ok((in_cells(cells.max(turn) as usize), None));
         }
         // equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent
         let likely = at_least(0.3 * bends * (1e-2 / tolerance).powf(1.8 / order));
-        let coarsest = uniform((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
+        let coarsest = in_cells((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let most = likely.max(turn).max(coarsest.cells.len() as f64);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
         Ok((refiner.start(likely as usize), Some(refiner)))
     }
@@ -863,11 +898,11 @@ impl Unit {
         if *tunable == before {
             return Ok(());
         }
-        let parameters = self.start.parameters.tuned(tunable);
-        parameters.validate()?;
+        allow(tunable.numbers())?;
         if *tunable != (Tunable { gravity: tunable.gravity, ..before }) {
             self.last = None;
-            self.integrator.damp(&parameters.rod()).map_err(Error::NoStart)?;
+            let rod = tunable.damped(self.start.parameters.rod());
+            self.integrator.damp(&rod).map_err(Error::NoStart)?;
         }
         self.tunable = *tunable;
         Ok(())
@@ -968,7 +1003,7 @@ impl Response<'_> {
     /// [`Error`] as of [`Unit::new`] and [`Unit::advance`].
     pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
         let Unit { start, outputs, .. } = self.unit;
-        let damping = start.parameters.tuned(&acting.tunable).rod();
+        let damping = acting.tunable.damped(start.parameters.rod());
         let (mut rod, path) = match &self.course {
             Some((course, Last { path, duration, acting: held })) => {
                 let segment = path.segment(&acting.inputs.sample(), *duration);
@@ -1026,7 +1061,7 @@ impl Archived for Option<Box<Unit>> {
         unit.visit(archive)?;
         if archive.is_loading() {
             unit.last = None;
-            unit.integrator.take_damping(&unit.start.parameters.tuned(&unit.tunable).rod());
+            unit.integrator.take_damping(&unit.tunable.damped(unit.start.parameters.rod()));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The commands, as one types them.
 
 use cosserat_rod::fmi2::description::{MODEL_IDENTIFIER, STEP_SIZE, STOP_TIME, binary, guid};
+use cosserat_rod::fmi2::model::Model;
 use cosserat_rod::package;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -108,7 +109,7 @@ fn simulate_follows_the_rows_of_its_inputs() {
     for (stop, rows) in [("0.5", 1), ("0.55", 2), ("0.6", 2), ("0.9", 4)] {
         let table = columns(&cosserat(&directory, &coarse(&["simulate", "in.csv", "--stop", stop])));
         assert_eq!(column(&table, "time").len(), rows);
-        assert_eq!(column(&table, "time")[rows - 1], stop.parse().unwrap());
+        assert_eq!(column(&table, "time")[rows - 1], stop.parse::<f64>().unwrap());
     }
 }
 
@@ -387,12 +388,13 @@ const XML: &str = "modelDescription.xml";
 #[test]
 fn info_tells_what_is_in_the_archive() {
     let directory = directory("info");
-    package::package(&directory.join("rod.fmu")).unwrap();
+    package::package(&directory.join("rod.fmu"), &Model::default()).unwrap();
     let text = cosserat(&directory, &["info", "rod.fmu"]);
     let platform = binary(MODEL_IDENTIFIER).split('/').nth(1).unwrap().to_owned();
     let able = "canGetAndSetFMUstate, canHandleVariableCommunicationStepSize";
     let version = format!("cosserat-rod {}", env!("CARGO_PKG_VERSION"));
-    for words in ["CosseratRod", "2.0", &guid(), &version, &platform, able, "19 inputs", "documentation/index.html"] {
+    let guid = guid(&Model::default());
+    for words in ["CosseratRod", "2.0", &guid, &version, &platform, able, "19 inputs", "documentation/index.html"] {
         assert!(text.contains(words), "{words}: {text}");
     }
     let row = |name: &str| -> Vec<String> {
@@ -409,7 +411,7 @@ fn info_tells_what_is_in_the_archive() {
 fn check_passes_what_is_packaged_and_names_what_is_wrong() {
     let directory = directory("check");
     let archive = directory.join("rod.fmu");
-    package::package(&archive).unwrap();
+    package::package(&archive, &Model::default()).unwrap();
     let text = cosserat(&directory, &["check", "rod.fmu"]);
     assert!(text.lines().count() == 13 && text.lines().all(|line| line.starts_with("ok  ")), "{text}");
 
@@ -444,7 +446,7 @@ fn check_passes_what_is_packaged_and_names_what_is_wrong() {
         &|files| drop(files.insert(library.clone(), b"text".to_vec())),
         &format!("library: {library}: "),
     );
-    edit("guid.fmu", &guid(), "{1}", "instance: fmi2Instantiate gave no instance; ");
+    edit("guid.fmu", &guid(&Model::default()), "{1}", "instance: fmi2Instantiate gave no instance; ");
     edit("version.fmu", "fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"", "description: of FMI 3.0, not 2.0");
     edit("exchange.fmu", "<CoSimulation ", "<ModelExchange ", "description: no co-simulation");
     edit("short.fmu", "</fmiModelDescription>", "", "description: the model description ends before its elements do");

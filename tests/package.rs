@@ -2,6 +2,7 @@
 
 use cosserat_rod::fmi2::description;
 use cosserat_rod::fmi2::host::Fmu;
+use cosserat_rod::fmi2::model::Model;
 use cosserat_rod::fmi2::variables::{self, Variable};
 use cosserat_rod::package::{self, documentation, raster, sketch, terminals};
 use quick_xml::Reader;
@@ -31,11 +32,11 @@ fn cosserat(directory: &Path, arguments: &[&str]) -> (bool, String) {
 fn the_committed_model_description_is_the_rendered_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("modelDescription/modelDescription.xml");
     if env::var_os("UPDATE").is_some() {
-        fs::write(&path, description::xml()).unwrap();
+        fs::write(&path, description::xml(&Model::default())).unwrap();
     }
     let committed = fs::read_to_string(&path).unwrap_or_default();
     assert!(
-        committed == description::xml(),
+        committed == description::xml(&Model::default()),
         "UPDATE=1 cargo test rewrites modelDescription.xml; commit it with its cause"
     );
 }
@@ -55,7 +56,7 @@ fn the_command_writes_the_default_archive_and_any_other() {
 #[test]
 fn the_archive_is_what_the_standard_asks_for() {
     let archive = directory("archive").join("rod.fmu");
-    package::package(&archive).unwrap();
+    package::package(&archive, &Model::default()).unwrap();
     let bytes = fs::read(&archive).unwrap();
     let mut zip = ZipArchive::new(io::Cursor::new(&bytes)).unwrap();
     let names: BTreeSet<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
@@ -85,14 +86,14 @@ fn the_archive_is_what_the_standard_asks_for() {
         assert!(u16::from_le_bytes([bytes[header + 4], bytes[header + 5]]) <= 20, "{name}");
     }
     let xml = io::read_to_string(zip.by_name("modelDescription.xml").unwrap()).unwrap();
-    assert!(xml == description::xml());
+    assert!(xml == description::xml(&Model::default()));
 }
 
 #[test]
 fn the_unpacked_archive_runs() {
     let directory = directory("unpacked");
     let archive = directory.join("rod.fmu");
-    package::package(&archive).unwrap();
+    package::package(&archive, &Model::default()).unwrap();
     package::unpack(&archive, &directory.join("rod")).unwrap();
     let fmu = Fmu::open(&directory.join("rod")).unwrap();
     let slave = fmu.instantiate("rod", true).unwrap();
@@ -136,7 +137,7 @@ fn elements(xml: &str) -> Vec<(String, BTreeMap<String, String>)> {
 
 #[test]
 fn the_documentation_has_every_variable() {
-    let html = documentation::index();
+    let html = documentation::index(&Model::default());
     let elements = elements(&html);
     let count = |name: &str| elements.iter().filter(|(element, _)| element == name).count();
     assert_eq!((count("table"), count("svg"), count("h1")), (3, 1, 1));

@@ -7,6 +7,7 @@
 use super::Progress;
 use super::picture::{self, Frame};
 use cosserat_rod::fmi2::host::{Fmu, Slave};
+use cosserat_rod::fmi2::model::Model;
 use cosserat_rod::package;
 use cosserat_rod::unit::STATIONS;
 use nalgebra::Vector3;
@@ -65,7 +66,7 @@ fn pulse(time: f64) -> Vector3<f64> {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    package::package(Path::new(FMU))?;
+    package::package(Path::new(FMU), &Model::default())?;
     package::unpack(Path::new(FMU), Path::new(UNPACKED))?;
     let fmu = Fmu::open(Path::new(UNPACKED))?;
     let slave = fmu.instantiate("rod", true)?;

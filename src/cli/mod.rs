@@ -9,10 +9,13 @@ mod page;
 mod picture;
 pub mod simulate;
 
+use cosserat_rod::fmi2::model::Model;
 use cosserat_rod::fmi2::variables::{self, Kind, Variable};
+use cosserat_rod::package::rod_file;
 use cosserat_rod::unit::{Inputs, Parameters};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Why a value given in words cannot be taken.
@@ -62,9 +65,9 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-/// Parameters and the start values of inputs, from the arguments of `--set`.
-pub fn settings(arguments: &[String]) -> Result<(Parameters, Inputs), Error> {
-    let (mut parameters, mut inputs) = (Parameters::default(), Inputs::default());
+/// Parameters and the start values of inputs, from the file of `--rod` and the arguments of `--set`.
+pub fn settings(rod: Option<&Path>, arguments: &[String]) -> Result<(Parameters, Inputs), Box<dyn std::error::Error>> {
+    let Model { mut parameters, mut inputs, .. } = rod.map(rod_file::read).transpose()?.unwrap_or_default();
     let known = variables::all();
     for text in arguments {
         let (name, value) = text.split_once('=').ok_or_else(|| Error::NoAssignment { text: text.clone() })?;
@@ -84,7 +87,7 @@ pub fn settings(arguments: &[String]) -> Result<(Parameters, Inputs), Error> {
         let values: Vec<&str> = value.split(',').map(str::trim).collect();
         let (given, needed) = (values.len(), row.components.len());
         if given != needed {
-            return Err(Error::Length { name: row.name, given, needed });
+            return Err(Error::Length { name: row.name, given, needed }.into());
         }
         for (element, value) in values.into_iter().enumerate() {
             set(&Variable { row, element }, value)?;

@@ -5,6 +5,7 @@ use cosserat_rod::unit::Unit;
 use nalgebra::Vector3;
 use std::error::Error;
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 /// Of which rod, and how many.
 #[derive(clap::Args)]
@@ -12,6 +13,9 @@ pub struct Arguments {
     /// How many frequencies, from the lowest.
     #[arg(short, long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..))]
     count: u8,
+    /// A rod in a file, as `package` takes it, in place of the unit's own.
+    #[arg(long, value_name = "FILE")]
+    rod: Option<PathBuf>,
     /// Sets a parameter, or an input the equilibrium is under; arrays by element (gravity[3]=0) or as a whole
     /// (gravity=0,0,0).
     #[arg(short, long, value_name = "NAME=VALUE")]
@@ -26,7 +30,7 @@ const STRETCH: f64 = 0.5;
 
 /// Prints the table.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let (mut parameters, inputs) = super::settings(&arguments.set)?;
+    let (mut parameters, inputs) = super::settings(arguments.rod.as_deref(), &arguments.set)?;
     parameters.start_in_equilibrium = true;
     let count = usize::from(arguments.count);
     let mut unit = Unit::new(&parameters, &inputs, None)?;

@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Where to write the outputs as CSV; without it, to standard output.
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// A rod in a file, as `package` takes it, in place of the unit's own.
+    #[arg(long, value_name = "FILE")]
+    rod: Option<PathBuf>,
     /// Sets a parameter, or the start value of an input; arrays by element (gravity[3]=0) or as a whole
     /// (gravity=0,0,0).
     #[arg(short, long, value_name = "NAME=VALUE")]
@@ -235,14 +238,15 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// From what the command line gives: a table, settings, the end and the communication step.
+    /// From what the command line gives: a table, a rod, settings, the end and the communication step.
     pub fn new(
         table: Option<&Path>,
+        rod: Option<&Path>,
         set: &[String],
         stop: Option<f64>,
         step: Option<f64>,
     ) -> Result<Self, Box<dyn error::Error>> {
-        let (parameters, inputs) = super::settings(set)?;
+        let (parameters, inputs) = super::settings(rod, set)?;
         let table = table.map(Table::read).transpose()?;
         let points = Points::new(table.as_ref(), stop, step)?;
         Ok(Self { parameters, inputs, table, points })
@@ -291,7 +295,8 @@ impl Experiment {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn error::Error>> {
-    let experiment = Experiment::new(arguments.inputs.as_deref(), &arguments.set, arguments.stop, arguments.step)?;
+    let Arguments { inputs, rod, set, stop, step, .. } = arguments;
+    let experiment = Experiment::new(inputs.as_deref(), rod.as_deref(), set, *stop, *step)?;
     let columns = outputs(&arguments.output)?;
     let sink: Box<dyn Write> = match &arguments.out {
         Some(path) => Box::new(File::create(path).map_err(|error| Error::File { path: path.clone(), error })?),

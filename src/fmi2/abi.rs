@@ -12,6 +12,7 @@
 #![allow(unsafe_code, non_camel_case_types, non_snake_case)]
 
 use super::instance::{Answer, Failure, Function, Instance, Note, Scalar, StatusKind};
+use super::model;
 use super::variables::Kind;
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -308,6 +309,16 @@ extern "C" fn fmi2GetVersion() -> fmi2String {
     c"2.0".as_ptr()
 }
 
+/// The rod of this library. What is compiled is the unit itself; another may have been written into the file since, of
+/// which the compiler must not think that it knows.
+#[used]
+static MODEL: model::Place = model::empty();
+
+fn model() -> Result<model::Model, Failure> {
+    let byte = |k: usize| Some(unsafe { ptr::read_volatile(MODEL.get(k)?) });
+    model::read(byte).map_err(Failure::NoModel)
+}
+
 /// The resource location is not looked at, for the unit has no resources.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2Instantiate(
@@ -333,7 +344,7 @@ unsafe extern "C" fn fmi2Instantiate(
         if fmuType != CO_SIMULATION {
             return Err(Failure::WrongType { given: fmuType });
         }
-        Instance::new(name?, &unsafe { text(fmuGUID, "fmuGUID") }?, loggingOn.0 != 0)
+        Instance::new(model()?, name?, &unsafe { text(fmuGUID, "fmuGUID") }?, loggingOn.0 != 0)
     });
     match instance {
         Ok(instance) => Box::into_raw(Box::new(Component { instance, log })).cast(),

@@ -1,10 +1,12 @@
-//! The table of variables as `modelDescription.xml`.
+//! The table of variables as `modelDescription.xml`, with the names and start values of a model.
 //!
-//! The GUID is a fingerprint of the text without it, and the library computes it from the table it was built with: a
-//! description and a library that do not belong together cannot be instantiated.
+//! The GUID is a fingerprint of the text without it, and of the shape of the unstressed rod, of which that does not tell.
+//! The library computes it from the table it was built with and the model that it holds: a description and a library
+//! that do not belong together cannot be instantiated.
 
+use super::model::{Experiment, Model};
 use super::variables::{self, Kind, Row, Slot, UNITS, Variable};
-use crate::unit::{Inputs, Parameters};
+use crate::rest::{Piece, RestShape};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use quick_xml::writer::ElementWriter;
@@ -13,7 +15,7 @@ use std::io;
 /// Where in an archive the model description lies.
 pub const FILE: &str = "modelDescription.xml";
 
-/// Name of the library in the archive.
+/// Name of the library in the archive of the unit itself, and that of its model.
 pub const MODEL_IDENTIFIER: &str = "CosseratRod";
 
 /// Where in an archive the library of a model lies for the platform this was compiled for, with forward slashes.
@@ -57,14 +59,20 @@ pub const LOG_CATEGORIES: [(&str, &str); 7] = [
 pub const ALL: &str = "logAll";
 
 /// The whole text.
-pub fn xml() -> String {
-    render(&guid())
+pub fn xml(model: &Model) -> String {
+    render(model, &guid(model))
 }
 
 /// The GUID, in braces.
-pub fn guid() -> String {
+pub fn guid(model: &Model) -> String {
+    let mut text = render(model, "").into_bytes();
+    let numbers = |piece: &Piece| [piece.part, piece.turn.x, piece.turn.y, piece.turn.z];
+    if model.parameters.rest_shape != RestShape::default() {
+        let numbers = model.parameters.rest_shape.pieces().iter().flat_map(numbers);
+        text.extend(numbers.flat_map(f64::to_le_bytes));
+    }
     let [a, b, c, d, e] = {
-        let hash = format!("{:032x}", fingerprint(render("").as_bytes()));
+        let hash = format!("{:032x}", fingerprint(&text));
         [0..8, 8..12, 12..16, 16..20, 20..32].map(|range| hash[range].to_owned())
     };
     format!("{{{a}-{b}-{c}-{d}-{e}}}")
@@ -77,8 +85,8 @@ fn fingerprint(text: &[u8]) -> u128 {
     text.iter().fold(OFFSET, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
 }
 
-fn render(guid: &str) -> String {
-    document(|xml| model(xml, guid))
+fn render(model: &Model, guid: &str) -> String {
+    document(|xml| root(xml, model, guid))
 }
 
 /// Where markup is written to.
@@ -100,13 +108,13 @@ pub(crate) fn markup(contents: impl FnOnce(&mut Xml) -> io::Result<()>) -> Strin
     String::from_utf8_lossy(&writer.into_inner()).into_owned() + "\n"
 }
 
-fn model(xml: &mut Xml, guid: &str) -> io::Result<()> {
+fn root(xml: &mut Xml, model: &Model, guid: &str) -> io::Result<()> {
     xml.create_element("fmiModelDescription")
         .with_attributes([
             ("fmiVersion", "2.0"),
-            ("modelName", MODEL_IDENTIFIER),
+            ("modelName", model.name.as_str()),
             ("guid", guid),
-            ("description", env!("CARGO_PKG_DESCRIPTION")),
+            ("description", model.description.as_str()),
             ("version", env!("CARGO_PKG_VERSION")),
             ("license", env!("CARGO_PKG_LICENSE")),
             ("generationTool", concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"))),
@@ -114,22 +122,23 @@ fn model(xml: &mut Xml, guid: &str) -> io::Result<()> {
         ])
         .write_inner_content(|xml| {
             let variables = variables::all();
-            co_simulation(xml)?;
+            co_simulation(xml, &model.name)?;
             units(xml)?;
             log_categories(xml)?;
-            default_experiment(xml)?;
+            default_experiment(xml, &model.experiment)?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
-                variables.iter().enumerate().try_for_each(|(reference, variable)| scalar(xml, reference, variable))
+                let (mut starts, mut each) = (model.starts(), variables.iter().enumerate());
+                each.try_for_each(|(reference, variable)| scalar(xml, reference, variable, starts(variable)))
             })?;
             structure(xml, &variables)
         })?;
     Ok(())
 }
 
-fn co_simulation(xml: &mut Xml) -> io::Result<()> {
+fn co_simulation(xml: &mut Xml, identifier: &str) -> io::Result<()> {
     xml.create_element("CoSimulation")
         .with_attributes([
-            ("modelIdentifier", MODEL_IDENTIFIER),
+            ("modelIdentifier", identifier),
             ("needsExecutionTool", "false"),
             ("canHandleVariableCommunicationStepSize", "true"),
             ("canInterpolateInputs", "false"),
@@ -175,8 +184,9 @@ fn log_categories(xml: &mut Xml) -> io::Result<()> {
     Ok(())
 }
 
-fn default_experiment(xml: &mut Xml) -> io::Result<()> {
-    let attributes = [("startTime", 0.0), ("stopTime", STOP_TIME), ("tolerance", TOLERANCE), ("stepSize", STEP_SIZE)];
+fn default_experiment(xml: &mut Xml, experiment: &Experiment) -> io::Result<()> {
+    let Experiment { stop_time, step_size, tolerance } = *experiment;
+    let attributes = [("startTime", 0.0), ("stopTime", stop_time), ("tolerance", tolerance), ("stepSize", step_size)];
     attributes
         .into_iter()
         .fold(xml.create_element("DefaultExperiment"), |element, (name, value)| number(element, name, value))
@@ -189,7 +199,7 @@ fn number<'a>(element: ElementWriter<'a, Vec<u8>>, name: &str, value: impl ToStr
     element.with_attribute((name, value.to_string().as_str()))
 }
 
-fn scalar(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()> {
+fn scalar(xml: &mut Xml, reference: usize, variable: &Variable, start: Option<f64>) -> io::Result<()> {
     let (causality, variability, initial) = triple(variable.row);
     let element = xml.create_element("ScalarVariable").with_attributes([
         ("name", variable.to_string().as_str()),
@@ -215,7 +225,7 @@ fn scalar(xml: &mut Xml, reference: usize, variable: &Variable) -> io::Result<()
                 };
             }
         }
-        if let Some(start) = variable.given(&mut Parameters::default(), &mut Inputs::default()) {
+        if let Some(start) = start {
             element = match variable.kind() {
                 Kind::Boolean => number(element, "start", start != 0.0),
                 _ => number(element, "start", start),

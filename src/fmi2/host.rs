@@ -10,6 +10,7 @@ pub use super::abi::{
     fmi2ComponentEnvironment, fmi2FMUstate, fmi2Integer, fmi2Real, fmi2Status, fmi2String, fmi2ValueReference,
 };
 use super::description;
+use super::model::Model;
 use super::variables::Kind;
 use libloading::Library;
 use quick_xml::events::{BytesStart, Event};
@@ -473,12 +474,12 @@ impl Fmu {
         Self::load(&directory.join(description.binary()), description, resources)
     }
 
-    /// Loads a library that has not been packaged, with the description this crate renders.
+    /// Loads a library that has not been packaged, with the description this crate renders of the unit itself.
     ///
     /// # Errors
     /// What of it cannot be loaded.
     pub fn from_library(path: &Path) -> Result<Self, Error> {
-        Self::load(path, Description::parse(&description::xml())?, String::new())
+        Self::load(path, Description::parse(&description::xml(&Model::default()))?, String::new())
     }
 
     fn load(path: &Path, description: Description, resources: String) -> Result<Self, Error> {

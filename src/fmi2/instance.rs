@@ -5,6 +5,7 @@
 //! stays. So the standard's state *error* does not exist here; a failed step may be repeated, or the run terminated.
 
 use super::description::{self, ALL, LOG_CATEGORIES};
+use super::model::Model;
 use super::saved::{self, Unreadable};
 use super::variables::{self, Kind, Variable};
 use crate::archive::{self, Archive, Archived, Corrupt, archived};
@@ -129,7 +130,10 @@ pub enum Failure {
     },
     WrongGuid {
         given: String,
+        expected: String,
     },
+    /// What [`super::model::read`] says of the library.
+    NoModel(Corrupt),
     UnknownReference {
         reference: u32,
     },
@@ -244,9 +248,10 @@ impl fmt::Display for Failure {
             Self::NullPointer { argument } => write!(f, "{argument} is a null pointer, or no array of that length"),
             Self::EmptyName => write!(f, "instanceName is empty; it must name the instance"),
             Self::WrongType { given } => write!(f, "fmuType = {given} is not allowed: only 1 (fmi2CoSimulation)"),
-            Self::WrongGuid { given } => {
-                write!(f, "fmuGUID = '{given}' is not allowed: this library is {}", description::guid())
+            Self::WrongGuid { given, expected } => {
+                write!(f, "fmuGUID = '{given}' is not allowed: this library is {expected}")
             }
+            Self::NoModel(error) => write!(f, "the rod in this library cannot be read: {error}"),
             Self::UnknownReference { reference } => write!(
                 f,
                 "value reference {reference} is unknown: those of the model description run from 0 to {}",
@@ -386,6 +391,8 @@ const PANICKING: &str = "panic in fmi2DoStep";
 pub struct Instance {
     name: String,
     guid: String,
+    /// Where every simulation begins.
+    model: Model,
     debug: Debug,
     variables: Vec<Variable>,
     now: Simulation,
@@ -405,6 +412,13 @@ struct Simulation {
     /// Before the first step a set drops it, and a get or the end of the initialisation builds it.
     unit: Option<Box<Unit>>,
     time: f64,
+}
+
+impl Simulation {
+    /// Before anything is set.
+    fn of(model: &Model) -> Self {
+        Self { parameters: model.parameters.clone(), inputs: model.inputs.clone(), ..Self::default() }
+    }
 }
 
 archived!(Simulation { mode, experiment, parameters, inputs, unit, time });
@@ -441,19 +455,21 @@ struct Debug {
 
 impl Instance {
     /// As after `fmi2Instantiate`.
-    pub fn new(name: String, guid: &str, debug: bool) -> Result<Self, Failure> {
+    pub fn new(model: Model, name: String, guid: &str, debug: bool) -> Result<Self, Failure> {
         if name.is_empty() {
             return Err(Failure::EmptyName);
         }
-        if guid != description::guid() {
-            return Err(Failure::WrongGuid { given: guid.to_owned() });
+        let expected = description::guid(&model);
+        if guid != expected {
+            return Err(Failure::WrongGuid { given: guid.to_owned(), expected });
         }
         Ok(Self {
             name,
-            guid: guid.to_owned(),
+            guid: expected,
             debug: Debug { on: debug, categories: Vec::new() },
             variables: variables::all(),
-            now: Simulation::default(),
+            now: Simulation::of(&model),
+            model,
             spare: Simulation::default(),
             saved: BTreeMap::new(),
         })
@@ -530,7 +546,7 @@ impl Instance {
 
     /// As after `fmi2Instantiate`; which debug lines the host wants is no part of the simulation and stays.
     pub fn reset(&mut self) -> Answer {
-        self.now = Simulation::default();
+        self.now = Simulation::of(&self.model);
         Ok(None)
     }
 

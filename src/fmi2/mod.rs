@@ -2,10 +2,12 @@
 //!
 //! ```text
 //! host =C=> abi -> instance -> {saved, variables} -> unit
-//! description -> variables          host: the other side of the C boundary, for the commands, tests, benchmarks
+//! description -> {model, variables}  host: the other side of the C boundary, for the commands, tests, benchmarks
 //! ```
 
 pub mod variables;
+
+pub mod model;
 
 pub mod description;
 

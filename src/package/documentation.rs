@@ -4,10 +4,14 @@
 //! paragraphs, lists, code and bold.
 
 use super::sketch;
-use crate::fmi2::description::{self, Xml, markup, triple};
+use crate::fmi2::description::{Xml, markup, triple};
+use crate::fmi2::model::Model;
 use crate::fmi2::variables::{Kind, ROWS, Row, Variable};
-use crate::unit::{Inputs, Parameters};
+use crate::rest::RestShape;
+use crate::unit::Parameters;
+use nalgebra::Vector3;
 use quick_xml::events::{BytesText, Event};
+use std::f64::consts::TAU;
 use std::io;
 
 /// Where in the archive it lies.
@@ -66,8 +70,8 @@ fn section(name: &str) -> &'static str {
     found.split_once("\n## ").map_or(found, |(found, _)| found)
 }
 
-/// The whole page.
-pub fn index() -> String {
+/// The whole page of a model.
+pub fn index(model: &Model) -> String {
     markup(|xml| {
         xml.write_event(Event::DocType(BytesText::new("html")))?;
         xml.create_element("html")
@@ -75,21 +79,24 @@ pub fn index() -> String {
             .write_inner_content(|xml| {
                 xml.create_element("head").write_inner_content(|xml| {
                     xml.create_element("meta").with_attribute(("charset", "utf-8")).write_empty()?;
-                    text(xml, "title", description::MODEL_IDENTIFIER)?;
+                    text(xml, "title", &model.name)?;
                     text(xml, "style", STYLE)
                 })?;
-                xml.create_element("body").write_inner_content(body)?;
+                xml.create_element("body").write_inner_content(|xml| body(xml, model))?;
                 Ok(())
             })?;
         Ok(())
     })
 }
 
-fn body(xml: &mut Xml) -> io::Result<()> {
-    text(xml, "h1", description::MODEL_IDENTIFIER)?;
+fn body(xml: &mut Xml, model: &Model) -> io::Result<()> {
+    text(xml, "h1", &model.name)?;
     let version =
         concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION"), ", licence ", env!("CARGO_PKG_LICENSE"));
     text(xml, "p", version)?;
+    if *model != Model::default() {
+        this_rod(xml, model)?;
+    }
     // up to the picture
     for block in blocks(section("")).iter().take(1) {
         flow(xml, block)?;
@@ -110,9 +117,26 @@ fn body(xml: &mut Xml) -> io::Result<()> {
     }
     for (causality, title) in [("input", "Inputs"), ("output", "Outputs"), ("parameter", "Parameters")] {
         text(xml, "h2", title)?;
-        table(xml, causality)?;
+        table(xml, causality, model)?;
     }
     Ok(())
+}
+
+/// What is baked into the model, beside the start values, which stand in the tables.
+fn this_rod(xml: &mut Xml, model: &Model) -> io::Result<()> {
+    text(xml, "p", &model.description)?;
+    let Parameters { length, rest_shape, .. } = &model.parameters;
+    if *rest_shape == RestShape::default() {
+        return Ok(());
+    }
+    let count = rest_shape.pieces().len();
+    let turn = rest_shape.turn(*length, &Vector3::zeros()) / TAU;
+    let pieces = if count == 1 { "one piece".to_owned() } else { format!("{count} pieces") };
+    let shape = Block::Paragraph(format!(
+        "The unstressed rod has the shape of {pieces} of constant curvature and twist, {length} m long, with {turn:.2} \
+         turns of its sections in all. `length` scales that shape as a whole; `rest_curvature` is added to its curvature."
+    ));
+    flow(xml, &shape)
 }
 
 fn text(xml: &mut Xml, element: &str, text: &str) -> io::Result<()> {
@@ -144,7 +168,7 @@ fn flow(xml: &mut Xml, block: &Block) -> io::Result<()> {
     Ok(())
 }
 
-fn table(xml: &mut Xml, causality: &str) -> io::Result<()> {
+fn table(xml: &mut Xml, causality: &str, model: &Model) -> io::Result<()> {
     let given = causality != "output";
     let mut columns = vec!["name", "unit", "type"];
     if given {
@@ -156,7 +180,7 @@ fn table(xml: &mut Xml, causality: &str) -> io::Result<()> {
         for row in ROWS.iter().filter(|row| triple(row).0 == causality) {
             let first = Variable { row, element: 0 };
             let kind = format!("{}, {}", first.kind().name(), triple(row).1);
-            let (name, start, allowed) = (row.to_string(), start(row), first.allowed().to_string());
+            let (name, start, allowed) = (row.to_string(), start(row, model), first.allowed().to_string());
             let mut cells = vec![name.as_str(), row.unit, &kind];
             if given {
                 cells.extend([start.as_str(), &allowed]);
@@ -179,12 +203,12 @@ fn line(xml: &mut Xml, element: &str, cells: &[&str]) -> io::Result<()> {
 }
 
 /// The start values of the elements, once if they are all the same.
-fn start(row: &'static Row) -> String {
-    let (mut parameters, mut inputs) = (Parameters::default(), Inputs::default());
+fn start(row: &'static Row, model: &Model) -> String {
+    let mut starts = model.starts();
     let elements = (0..row.components.len().max(1)).map(|element| Variable { row, element });
     let mut values: Vec<String> = elements
         .filter_map(|variable| {
-            let value = variable.given(&mut parameters, &mut inputs)?;
+            let value = starts(&variable)?;
             Some(match variable.kind() {
                 Kind::Boolean => (value != 0.0).to_string(),
                 _ => value.to_string(),

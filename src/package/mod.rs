@@ -8,6 +8,11 @@ pub mod terminals;
 
 pub mod documentation;
 
+pub mod centreline;
+
+pub mod rod_file;
+
+use crate::fmi2::model::{self, Model};
 use crate::fmi2::{description, host};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -26,6 +31,8 @@ pub enum Error {
     },
     /// The library cannot be loaded, or is of another version than this program.
     Library(host::Error),
+    /// The library does not take the rod.
+    NoPlace(model::NoPlace),
     /// The icon cannot be drawn.
     Icon(raster::Error),
     /// An archive has no file of this name.
@@ -52,6 +59,7 @@ impl fmt::Display for Error {
                 places.iter().try_for_each(|place| write!(f, " {}", place.display()))
             }
             Self::Library(error) => write!(f, "the library does not fit this program, build both again: {error}"),
+            Self::NoPlace(error) => error.fmt(f),
             Self::Icon(error) => write!(f, "the icon of the archive: {error}"),
             Self::Missing { archive, name } => write!(f, "{}: no {name} in the archive", archive.display()),
             Self::File { path, error } => write!(f, "{}: {error}", path.display()),
@@ -85,28 +93,31 @@ pub fn library() -> Result<PathBuf, Error> {
     }
 }
 
-/// Writes the archive, and the directories above it where they are missing.
+/// Writes the archive of a model, and the directories above it where they are missing.
 ///
 /// # Errors
 /// [`Error`]
-pub fn package(archive: &Path) -> Result<(), Error> {
+pub fn package(archive: &Path, model: &Model) -> Result<(), Error> {
     let library = library()?;
     // A library that was left over from another version answers to another GUID.
     host::Fmu::from_library(&library)
         .and_then(|fmu| fmu.instantiate("package", false).map(drop))
         .map_err(Error::Library)?;
-    let code = fs::read(&library).map_err(at(&library))?;
-    let binary = description::binary(description::MODEL_IDENTIFIER);
+    let mut code = fs::read(&library).map_err(at(&library))?;
+    if *model != Model::default() {
+        model::write(&mut code, model).map_err(Error::NoPlace)?;
+    }
+    let (binary, ports) = (description::binary(&model.name), terminals::ports_file(&model.name));
     let files = [
-        (description::FILE, description::xml().into_bytes()),
+        (description::FILE, description::xml(model).into_bytes()),
         (sketch::ICON, raster::png(&sketch::svg(), 1).map_err(Error::Icon)?),
         (binary.as_str(), code),
-        (documentation::INDEX, documentation::index().into_bytes()),
+        (documentation::INDEX, documentation::index(model).into_bytes()),
         ("documentation/licenses/LICENSE-APACHE.txt", include_bytes!("../../LICENSE-APACHE").to_vec()),
         ("documentation/licenses/LICENSE-MIT.txt", include_bytes!("../../LICENSE-MIT").to_vec()),
         ("documentation/licenses/THIRD-PARTY.txt", include_bytes!("../../THIRD-PARTY.txt").to_vec()),
         (terminals::TERMINALS, terminals::terminals().into_bytes()),
-        (terminals::PORTS, terminals::ports().into_bytes()),
+        (&ports, terminals::ports().into_bytes()),
     ];
     let bytes = zip(&files).map_err(at(archive))?;
     if let Some(directory) = archive.parent() {

@@ -10,9 +10,11 @@ use std::io;
 /// Where in the archive the terminals lie.
 pub const TERMINALS: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 
-/// Where in the archive the ports of the Open Simulation Platform lie. Its loader wants the file beside the archive
-/// under this name.
-pub const PORTS: &str = "extra/com.open-simulation-platform/CosseratRod_OspModelDescription.xml";
+/// Where in the archive of a model of this name the ports of the Open Simulation Platform lie. Its loader wants the file
+/// beside the archive under this name.
+pub fn ports_file(model: &str) -> String {
+    format!("extra/com.open-simulation-platform/{model}_OspModelDescription.xml")
+}
 
 /// An end of the rod.
 struct End {

@@ -1,7 +1,7 @@
 """The packaged unit as users of fmpy meet it.
 
-Needs what `tests/run` leaves in `target`: `CosseratRod.fmu`, the inputs `drive.csv`, and `trajectory.csv`, which
-`cosserat simulate` makes of them.
+Needs what `tests/run` leaves in `target`: `CosseratRod.fmu`, `CoilHose.fmu`, the inputs `drive.csv`, and
+`trajectory.csv`, which `cosserat simulate` makes of them.
 """
 
 import csv
@@ -21,6 +21,7 @@ from fmpy.validation import validate_fmu
 
 TARGET = Path(__file__).parents[2] / "target"
 FMU = TARGET / "CosseratRod.fmu"
+BAKED = TARGET / "CoilHose.fmu"
 STEP = 0.01
 STEPS = 200
 
@@ -77,6 +78,16 @@ def test_validate_reports_nothing(tmp_path):
     assert validate_fmu(FMU) == []
     result = fmpy("validate", FMU, cwd=tmp_path)
     assert result.returncode == 0, result.stdout
+
+
+def test_a_rod_from_a_file_is_valid_and_runs_as_it_is_baked(tmp_path):
+    assert validate_fmu(BAKED) == []
+    result = fmpy("validate", BAKED, cwd=tmp_path)
+    assert result.returncode == 0, result.stdout
+    result = simulate_fmu(BAKED, output=["tip.position[3]", "base.reaction_force[3]"])
+    # it hangs in equilibrium from a base at z = 2, with 0.05 kg at its end
+    assert len(result) == 201 and abs(result["tip.position[3]"][-1] - result["tip.position[3]"][0]) < 1e-3
+    assert result["tip.position[3]"][0] < 1.9 and result["base.reaction_force[3]"][-1] < -0.05 * 9.81
 
 
 def test_simulate_without_options_runs_the_default_experiment(tmp_path):

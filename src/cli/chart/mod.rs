@@ -127,7 +127,7 @@ fn built_in(scene: Scene, arguments: &Arguments, others: &[Point]) -> Result<Cha
 }
 
 fn own(inputs: &Path, arguments: &Arguments, others: &[Point]) -> Result<Chart, Box<dyn Error>> {
-    let experiment = Experiment::new(Some(inputs), &arguments.set, None, None)?;
+    let experiment = Experiment::new(Some(inputs), None, &arguments.set, None, None)?;
     if experiment.steps() == 0 {
         return Err(format!("{}: one row only, nothing moves", inputs.display()).into());
     }
