@@ -9,11 +9,11 @@
 //!
 //! Where the length of the steps is given, and for a rod that shears and stretches, they are generalized-α in space. One
 //! of those that diverges is halved, and its halves again if need be; if that does not help either, the rod is as it was
-//! before the interval.
+//! before the interval. So are those of a rod whose tip is held, and for as long as it is.
 
 use crate::alpha::Scheme;
 use crate::archive::{Archive, Archived, Corrupt, archived};
-use crate::boundary::{Boundary, Drive};
+use crate::boundary::{Boundary, Drive, Held};
 use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
 use crate::mesh::Mesh;
@@ -155,6 +155,10 @@ pub struct Ends {
     pub force: Vec3,
     /// Exerted on the base, about the base point, N·m.
     pub moment: Vec3,
+    /// Exerted on what holds the tip, N; zero where nothing does.
+    pub tip_force: Vec3,
+    /// Exerted on what holds the tip, about the tip point, N·m.
+    pub tip_moment: Vec3,
 }
 
 /// How long the steps of a method may be.
@@ -377,15 +381,62 @@ impl Integrator {
     /// [`Failed`]; the rod is then exactly as before.
     pub fn advance(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
         self.keep();
+        self.go_on(drive, duration)
+    }
+
+    /// Makes a rod whose tip was free ready to have it held from now on: in space, and on cells none of which is longer than
+    /// `longest`, m, unless they are given. `boundary` is what acted on it so far. [`Self::go_on`] is to follow, or
+    /// [`Self::restore`].
+    pub fn prepare_to_hold(&mut self, boundary: &Boundary, longest: f64) {
+        self.keep();
+        if self.way == Way::Static {
+            return;
+        }
+        self.leave_plane();
+        if let Some((refiner, _)) = &mut self.refiners {
+            // cells that cannot be started stay as they were
+            if refiner.halve(&mut self.stepper, boundary, longest) == Ok(true) {
+                self.see_energy(&boundary.gravity);
+            }
+        }
+    }
+
+    /// As [`Self::advance`], after [`Self::prepare_to_hold`]: what an error takes back begins there.
+    ///
+    /// # Errors
+    /// [`Failed`]; the rod is then exactly as before that.
+    pub fn go_on(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        let begin = drive(0.0).boundary;
         let done = match self.way {
-            Way::Accurate { .. } => self.follow(drive, duration),
-            Way::Equal => self.march(drive, duration),
+            Way::Accurate { .. } if begin.tip.held == Held::FREE => self.follow(drive, duration),
+            Way::Accurate { .. } | Way::Equal => self.catch(&begin).and_then(|()| self.march(drive, duration)),
             Way::Static => self.drift(drive, duration),
         };
         if done.is_err() {
             self.restore();
         }
         done
+    }
+
+    /// Begins anew in space where the tip's support has come or gone, which changes the accelerations at once.
+    fn catch(&mut self, begin: &Boundary) -> Result<(), Failed> {
+        self.leave_plane();
+        if self.stepper.state.boundary.tip.held == begin.tip.held {
+            return Ok(());
+        }
+        if self.stepper.rod.is_extensible() {
+            // its accelerations have a history of their own
+            self.stepper.state.boundary.tip = begin.tip;
+            return Ok(());
+        }
+        self.stepper.accelerate(begin).map_err(|cause| Failed { time: 0.0, step: self.step, cause })
+    }
+
+    fn leave_plane(&mut self) {
+        if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
+            write(plane, &mut self.stepper);
+        }
+        self.in_plane = false;
     }
 
     fn keep(&mut self) {
@@ -407,7 +458,8 @@ impl Integrator {
         }
     }
 
-    fn restore(&mut self) {
+    /// Makes the rod what it was before the interval.
+    pub fn restore(&mut self) {
         let Before { in_plane, pace, simple, energy, effort } = self.before;
         (self.in_plane, self.pace, self.simple) = (in_plane, pace, simple);
         (self.energy, self.effort) = (energy, effort);
@@ -789,9 +841,11 @@ impl Integrator {
         if let Some(plane) = self.plane() {
             let (Tip { position, velocity, rotation, angular_velocity }, (force, moment)) =
                 (plane.tip(), plane.reaction());
-            return Ends { position, rotation, velocity, angular_velocity, force, moment };
+            let (tip_force, tip_moment) = Default::default();
+            return Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment };
         }
-        let state = &self.stepper.state;
+        let Stepper { state, rod, .. } = &self.stepper;
+        let (tip_force, tip_moment) = state.tip_reaction(rod);
         let (tip, memory, base) = (state.tip(), state.tip_memory(), &state.nodes[0]);
         Ends {
             position: tip.position,
@@ -800,6 +854,8 @@ impl Integrator {
             angular_velocity: tip.rotation * memory.spin.velocity.value,
             force: base.force,
             moment: base.moment,
+            tip_force: Vec3::zeros() - tip_force,
+            tip_moment: Vec3::zeros() - tip_moment,
         }
     }
 

@@ -1,11 +1,11 @@
 //! The model without FMI: parameters and inputs in, one rod advanced by communication steps, outputs out.
 //!
-//! Between two communication points the base follows a path through what the host samples ([`crate::path`]) and the
+//! Between two communication points the base, and a driven tip, follow a path through what the host samples ([`crate::path`]) and the
 //! rod is moved to the tolerance ([`crate::integrator`]). What the host may set is checked here, and errors name it.
 
 use crate::alpha::Scheme;
 use crate::archive::{self, Archive, Archived, Corrupt, archived};
-use crate::boundary::{Boundary, Drive, Rates};
+use crate::boundary::{Boundary, Drive, Rates, Support};
 use crate::energy::Energy;
 use crate::integrator::{Effort, Ends, Failed, Integrator, Way};
 use crate::mesh::{MAX_STAGES, Mesh};
@@ -15,6 +15,7 @@ use crate::pose::State;
 use crate::refine::Refiner;
 use crate::rod::Rod;
 use crate::so3;
+use crate::span;
 use crate::stepper::{Diverged, Stepper};
 use nalgebra::{Vector3, Vector4};
 use std::f64::consts::PI;
@@ -62,6 +63,10 @@ pub struct Parameters {
     pub extensible: bool,
     /// 0 pose and twist are given, 1 pose only, 2 twist only.
     pub base_motion: i32,
+    /// 0 the tip is free and loaded, 1 it is driven; may change between steps.
+    pub tip_mode: i32,
+    /// As `base_motion`, of a driven tip.
+    pub tip_motion: i32,
     /// Cells along the rod; 0 = chosen here.
     pub cells: i32,
     /// Gauss points in a cell, 1 to 4; 0 = chosen here.
@@ -99,6 +104,8 @@ archived!(Parameters {
     tip_inertia,
     extensible,
     base_motion,
+    tip_mode,
+    tip_motion,
     cells,
     stages,
     step,
@@ -131,6 +138,8 @@ impl Default for Parameters {
             tip_inertia: 0.0,
             extensible: false,
             base_motion: 0,
+            tip_mode: 0,
+            tip_motion: 0,
             cells: 0,
             stages: 0,
             step: 0.0,
@@ -158,12 +167,32 @@ pub struct Inputs {
     pub tip_force: Vector3<f64>,
     /// Dead moment on the tip, about the tip point, N·m.
     pub tip_moment: Vector3<f64>,
+    /// Position of a driven tip, m.
+    pub tip_position: Vector3<f64>,
+    /// Orientation of a driven tip, as that of the base.
+    pub tip_orientation: Vector4<f64>,
+    /// Velocity of a driven tip, m/s.
+    pub tip_velocity: Vector3<f64>,
+    /// Angular velocity of a driven tip, rad/s.
+    pub tip_angular_velocity: Vector3<f64>,
 }
 
-archived!(Inputs { base_position, base_orientation, base_velocity, base_angular_velocity, tip_force, tip_moment });
+archived!(Inputs {
+    base_position,
+    base_orientation,
+    base_velocity,
+    base_angular_velocity,
+    tip_force,
+    tip_moment,
+    tip_position,
+    tip_orientation,
+    tip_velocity,
+    tip_angular_velocity,
+});
 
 impl Default for Inputs {
-    /// A base at rest from which the rod leaves along +x, no loads.
+    /// A base at rest from which the rod leaves along +x, no loads; a driven tip half a metre away that points there as
+    /// well.
     fn default() -> Self {
         Self {
             base_position: Vector3::zeros(),
@@ -172,6 +201,10 @@ impl Default for Inputs {
             base_angular_velocity: Vector3::zeros(),
             tip_force: Vector3::zeros(),
             tip_moment: Vector3::zeros(),
+            tip_position: Vector3::x() * 0.5,
+            tip_orientation: Vector4::new(0.5f64.sqrt(), 0.0, 0.5f64.sqrt(), 0.0),
+            tip_velocity: Vector3::zeros(),
+            tip_angular_velocity: Vector3::zeros(),
         }
     }
 }
@@ -191,6 +224,10 @@ pub struct Outputs {
     pub base_reaction_force: Vector3<f64>,
     /// Moment the rod exerts on its base, about the base point, N·m.
     pub base_reaction_moment: Vector3<f64>,
+    /// Force the rod exerts on what drives its tip, N; zero where nothing does.
+    pub tip_reaction_force: Vector3<f64>,
+    /// Moment the rod exerts on what drives its tip, about the tip point, N·m; zero where nothing does.
+    pub tip_reaction_moment: Vector3<f64>,
     /// Points of the centreline at equal arc lengths, first the base, last the tip, m.
     pub stations: [Vector3<f64>; STATIONS],
     /// Energies and works.
@@ -212,6 +249,8 @@ archived!(Outputs {
     tip_angular_velocity,
     base_reaction_force,
     base_reaction_moment,
+    tip_reaction_force,
+    tip_reaction_moment,
     stations,
     energy,
     power_base,
@@ -303,6 +342,20 @@ pub enum Error {
         /// The lowest ω², 1/s².
         omega_squared: f64,
     },
+    /// No equilibrium with the tip where it is to be driven from can be reached.
+    NotHeld(Diverged),
+    /// The only equilibria between the two ends that were found are unstable.
+    HeldUnstably {
+        /// The lowest ω², 1/s².
+        omega_squared: f64,
+    },
+    /// The ends are to be further apart than a rod reaches that does not stretch, or nearly so.
+    OutOfReach {
+        /// Between the ends, m.
+        distance: f64,
+        /// Of the rod, m.
+        length: f64,
+    },
     /// The equations of motion at the start are singular.
     NoStart(Diverged),
     /// No equilibrium follows the last one: a rod that buckles or snaps is not at rest in between.
@@ -334,6 +387,22 @@ impl fmt::Display for Error {
                 f,
                 "start_in_equilibrium: the static equilibrium is unstable (lowest squared frequency {omega_squared:.3e} 1/s2)"
             ),
+            Self::NotHeld(cause) => {
+                write!(
+                    f,
+                    "tip.mode = 1: no static equilibrium between the ends can be reached from the rest shape ({cause})"
+                )
+            }
+            Self::HeldUnstably { omega_squared } => write!(
+                f,
+                "tip.mode = 1: the static equilibria between the ends that were found are unstable (lowest squared frequency \
+                 {omega_squared:.3e} 1/s2)"
+            ),
+            Self::OutOfReach { distance, length } => write!(
+                f,
+                "the driven tip is {distance:.6} m from the base, too far for a rod with length = {length} m that does not \
+                 stretch: bring tip.driven_position nearer to base.position, or set extensible = true"
+            ),
             Self::NoStart(cause) => write!(f, "the equations of motion at the start have no solution ({cause})"),
             Self::NoEquilibriumNearby { time, cause } => write!(
                 f,
@@ -355,8 +424,10 @@ impl std::error::Error for Error {}
 /// Something the host should know although the step succeeded; each kind is given once in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Pose and twist of the base do not belong to one motion.
+    /// Pose and twist of the base, or of a driven tip, do not belong to one motion.
     PoseAndTwistDisagree {
+        /// Which end.
+        end: &'static str,
         /// Names of the two variables.
         names: [&'static str; 2],
         /// How far apart they have run.
@@ -369,10 +440,10 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PoseAndTwistDisagree { names: [pose, twist], distance, unit } => write!(
+            Self::PoseAndTwistDisagree { end, names: [pose, twist], distance, unit } => write!(
                 f,
-                "{pose} and the motion that {twist} describes are {distance:.3e} {unit} apart; the base follows {twist} and \
-                 is led back slowly (base.motion = 1 takes the pose alone, 2 the twist alone)"
+                "{pose} and the motion that {twist} describes are {distance:.3e} {unit} apart; the {end} follows {twist} and \
+                 is led back slowly ({end}.motion = 1 takes the pose alone, 2 the twist alone)"
             ),
         }
     }
@@ -382,8 +453,32 @@ impl fmt::Display for Warning {
 /// disagree; half a communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
+/// Distance of the ends over the length from which on a rod that does not stretch and cannot be moved is taken for taut.
+const TAUT: f64 = 0.98;
+
 /// Internal steps in a communication step beyond which the host has asked for something else than it wants.
 const MAX_INTERNAL_STEPS: f64 = 1e7;
+
+/// An end of the rod with a path, in the words of the warning.
+struct End {
+    place: usize,
+    name: &'static str,
+    pose: [&'static str; 2],
+    twist: [&'static str; 2],
+}
+
+const BASE: End = End {
+    place: 0,
+    name: "base",
+    pose: ["base.position", "base.orientation"],
+    twist: ["base.velocity", "base.angular_velocity"],
+};
+const TIP: End = End {
+    place: 1,
+    name: "tip",
+    pose: ["tip.driven_position", "tip.driven_orientation"],
+    twist: ["tip.driven_velocity", "tip.driven_angular_velocity"],
+};
 
 /// What a rod was started from: it settles all that is fixed, and how much room there is.
 #[derive(Clone, Debug, Default)]
@@ -401,12 +496,21 @@ archived!(Start { parameters, inputs, tolerance });
 pub struct Unit {
     start: Start,
     integrator: Integrator,
-    /// Longest internal step, where the host gives it, s.
-    step: Option<f64>,
+    /// Longest step of generalized-α, s.
+    step: f64,
+    /// Whether there are no others, whatever holds the tip.
+    steps_equally: bool,
+    /// Longest cell of a rod whose tip is held, m.
+    longest_cell: f64,
     quasi_static: bool,
     gravity: Vector3<f64>,
     path: Path,
-    warned: bool,
+    /// Of the tip, of no use where it is free.
+    tip_path: Path,
+    /// Whether the tip is driven: at present, and in the next step.
+    driven: [bool; 2],
+    /// Of the base, and of the tip.
+    warned: [bool; 2],
     outputs: Outputs,
 }
 
@@ -433,7 +537,7 @@ impl Parameters {
     }
 
     /// Every number among the parameters: its name, its value and what it may be.
-    fn numbers(&self) -> [(&'static str, f64, Allowed); 27] {
+    fn numbers(&self) -> [(&'static str, f64, Allowed); 29] {
         use Allowed::{Between, Choice, Finite, NonNegative, Positive};
         let [i_1, i_2] = self.section_second_moment;
         let (kappa, g) = (self.rest_curvature, self.gravity);
@@ -460,6 +564,8 @@ impl Parameters {
             ("tip.mass", self.tip_mass, NonNegative),
             ("tip.inertia", self.tip_inertia, NonNegative),
             ("base.motion", f64::from(self.base_motion), Choice(0, 2)),
+            ("tip.mode", f64::from(self.tip_mode), Choice(0, 1)),
+            ("tip.motion", f64::from(self.tip_motion), Choice(0, 2)),
             ("cells", f64::from(self.cells), Choice(0, MAX_CELLS)),
             ("stages", f64::from(self.stages), Choice(0, MAX_STAGES as i32)),
             ("step", self.step, NonNegative),
@@ -500,28 +606,44 @@ impl Parameters {
             }
             return Ok((uniform(self.cells as usize), None));
         }
+        if self.extensible || self.step > 0.0 || self.quasi_static {
+            let cells = self.cells_enough(rod, boundary, tolerance, ENOUGH);
+            let cells = if self.tip_mode == 1 { cells.max(CELLS_BETWEEN_ENDS) } else { cells };
+            return Ok((uniform(cells.max(turn) as usize), None));
+        }
+        let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
+        let coarsest = uniform((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
+        // the motion to come is not seen at the start
+        let cells = if self.tip_mode == 1 { self.length / self.longest_cell(rod, boundary, tolerance) } else { likely };
+        Ok((refiner.start(cells as usize), Some(refiner)))
+    }
+
+    /// Equal cells that are right to `tolerance`: `part` of the lengths in which loads bend the rod, at the tolerance
+    /// `reference`, and more by the power `grows` of the order below it.
+    fn cells_enough(
+        &self,
+        rod: &Rod,
+        boundary: &Boundary,
+        tolerance: f64,
+        Cells { part, reference, grows }: Cells,
+    ) -> f64 {
         // loads bend a rod within (EI/w)^(1/3) of where it is held
         let load = rod.mass_per_length * self.gravity.norm()
             + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
         let wound = boundary.tip_moment.norm() * self.length / softest;
+        let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
         let order = 2.0 * stages as f64;
-        let at_least = |cells: f64| {
-            let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
-            cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
-        };
-        if self.extensible || self.step > 0.0 || self.quasi_static {
-            // measured on a rope of seven such lengths, five cells of four points are right to 3e-4
-            let cells = at_least(0.7 * bends * (1e-3 / tolerance).powf(1.0 / order));
-            return Ok((uniform(cells.max(turn) as usize), None));
-        }
-        // equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent
-        let likely = at_least(0.3 * bends * (1e-2 / tolerance).powf(1.8 / order));
-        let coarsest = uniform((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * likely.max(turn)).max(LEAST_ROOM) as usize);
-        // the motion to come is not seen at the start
-        Ok((refiner.start(likely as usize), Some(refiner)))
+        let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
+        let cells = part * bends * (reference / tolerance).powf(grows / order);
+        cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
+    }
+
+    /// The longest cell of a rod whose tip is held, m: its cells do not choose themselves.
+    fn longest_cell(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> f64 {
+        self.length / self.cells_enough(rod, boundary, tolerance, ENOUGH).max(CELLS_BETWEEN_ENDS)
     }
 
     /// The shortest time in which gravity or stiffness move the whole rod, s.
@@ -544,7 +666,10 @@ impl Parameters {
     /// [`Error`] names the parameter that is not allowed together with others, or says why there is no start.
     pub fn start(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
         let (mut stepper, mut refiner) = self.unstressed(boundary, tolerance)?;
-        if self.start_in_equilibrium || self.quasi_static {
+        let mut moves = false;
+        if self.tip_mode == 1 {
+            moves = self.start_between_ends(&mut stepper, boundary)?;
+        } else if self.start_in_equilibrium || self.quasi_static {
             let found = match &mut refiner {
                 Some(refiner) => {
                     stepper.reserve(refiner.most_cells());
@@ -559,10 +684,32 @@ impl Parameters {
             }
         }
         let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
-        if way != Way::Static {
-            stepper.start(boundary).map_err(Error::NoStart)?;
+        if way != Way::Static && !(moves && self.extensible) {
+            // the jerks of a start are those of a rigid motion
+            let started = if moves { stepper.accelerate(boundary) } else { stepper.start(boundary) };
+            started.map_err(Error::NoStart)?;
         }
         Ok(Integrator::new(stepper, refiner, way, scheme, step, boundary))
+    }
+
+    /// Leads the tip of the unstressed rod to where `boundary` drives it; whether the ends move other than as one body.
+    fn start_between_ends(&self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Error> {
+        let distance = (boundary.tip.position - boundary.base.position).norm();
+        self.reaches(distance, 1.0)?;
+        let cause = |diverged| self.reaches(distance, TAUT).err().unwrap_or(Error::NotHeld(diverged));
+        let omega_squared = span::hang(stepper, boundary).map_err(cause)?;
+        if omega_squared <= 0.0 {
+            return Err(Error::HeldUnstably { omega_squared });
+        }
+        span::set_in_motion(stepper, boundary, self.time(&stepper.rod)).map_err(cause)
+    }
+
+    /// Whether the rod reaches from end to end of `distance`, m, with `part` of its length.
+    fn reaches(&self, distance: f64, part: f64) -> Result<(), Error> {
+        match self.extensible || distance < part * self.length {
+            true => Ok(()),
+            false => Err(Error::OutOfReach { distance, length: self.length }),
+        }
     }
 
     /// The same rod where it has not been started.
@@ -593,6 +740,19 @@ impl Parameters {
     }
 }
 
+/// A rule for the number of cells.
+struct Cells {
+    part: f64,
+    reference: f64,
+    grows: f64,
+}
+
+/// Measured on a rope of seven such lengths, five cells of four points are right to 3e-4.
+const ENOUGH: Cells = Cells { part: 0.7, reference: 1e-3, grows: 1.0 };
+/// Equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent.
+const LIKELY: Cells = Cells { part: 0.3, reference: 1e-2, grows: 1.8 };
+/// Fewest cells of a rod between two ends: it may turn by more than a whole turn on its way, and a cell by less than one.
+const CELLS_BETWEEN_ENDS: f64 = 4.0;
 /// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
 const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
@@ -635,15 +795,33 @@ impl Inputs {
                 return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
             }
         }
-        let norm = self.base_orientation.norm();
-        if !(norm > 1e-100 && norm.is_finite()) {
-            return Err(Error::NotAllowed {
-                name: "base.orientation",
-                value: norm,
-                allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
-            });
+        is_orientation("base.orientation", &self.base_orientation)
+    }
+
+    /// The same for those that only a driven tip reads.
+    fn validate_tip(&self) -> Result<(), Error> {
+        const NAMES: [[&str; 3]; 3] = [
+            ["tip.driven_position[1]", "tip.driven_position[2]", "tip.driven_position[3]"],
+            ["tip.driven_velocity[1]", "tip.driven_velocity[2]", "tip.driven_velocity[3]"],
+            ["tip.driven_angular_velocity[1]", "tip.driven_angular_velocity[2]", "tip.driven_angular_velocity[3]"],
+        ];
+        let vectors = [&self.tip_position, &self.tip_velocity, &self.tip_angular_velocity];
+        let components = NAMES.iter().flatten().zip(vectors.into_iter().flatten());
+        for (name, value) in components {
+            if !value.is_finite() {
+                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
+            }
         }
-        Ok(())
+        is_orientation("tip.driven_orientation", &self.tip_orientation)
+    }
+
+    fn tip_sample(&self) -> Sample {
+        Sample {
+            position: self.tip_position,
+            rotation: so3::from_quaternion(&self.tip_orientation.normalize()),
+            velocity: self.tip_velocity,
+            angular_velocity: self.tip_angular_velocity,
+        }
     }
 
     fn sample(&self) -> Sample {
@@ -653,6 +831,27 @@ impl Inputs {
             velocity: self.base_velocity,
             angular_velocity: self.base_angular_velocity,
         }
+    }
+}
+
+fn is_orientation(name: &'static str, quaternion: &Vector4<f64>) -> Result<(), Error> {
+    let norm = quaternion.norm();
+    match norm > 1e-100 && norm.is_finite() {
+        true => Ok(()),
+        false => Err(Error::NotAllowed {
+            name,
+            value: norm,
+            allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
+        }),
+    }
+}
+
+/// What `base.motion` and `tip.motion` stand for.
+fn given(motion: i32) -> Given {
+    match motion {
+        0 => Given::PoseAndTwist,
+        1 => Given::Pose,
+        _ => Given::Twist,
     }
 }
 
@@ -675,35 +874,38 @@ impl Unit {
         let Start { parameters, inputs, tolerance } = &start;
         parameters.validate()?;
         inputs.validate()?;
-        let given = |value: &f64| value.is_finite() && *value > 0.0;
-        let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
-        let path = Path::new(
-            match parameters.base_motion {
-                0 => Given::PoseAndTwist,
-                1 => Given::Pose,
-                _ => Given::Twist,
-            },
-            inputs.sample(),
-        );
+        let positive = |value: &f64| value.is_finite() && *value > 0.0;
+        let tolerance = Some(parameters.tolerance).filter(positive).or(tolerance.filter(positive)).unwrap_or(1e-3);
+        let path = Path::new(given(parameters.base_motion), inputs.sample());
+        let driven = parameters.tip_mode == 1;
+        if driven {
+            inputs.validate_tip()?;
+        }
+        let tip_path = Path::new(given(parameters.tip_motion), inputs.tip_sample());
         let boundary = Boundary {
+            tip: if driven { *tip_path.base() } else { Support::free() },
             tip_force: inputs.tip_force,
             tip_moment: inputs.tip_moment,
             ..Boundary::hanging_from(*path.base(), parameters.gravity)
         };
         Ok(Self {
             integrator: begin(parameters, &boundary, tolerance)?,
-            step: (parameters.step > 0.0 || parameters.extensible)
-                .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
+            step: parameters.longest_step(&parameters.rod(), tolerance),
+            steps_equally: parameters.step > 0.0 || parameters.extensible,
+            longest_cell: parameters.longest_cell(&parameters.rod(), &boundary, tolerance),
             quasi_static: parameters.quasi_static,
             gravity: parameters.gravity,
             path,
-            warned: false,
+            tip_path,
+            driven: [driven; 2],
+            warned: [false; 2],
             outputs: Outputs::default(),
             start,
         })
     }
 
-    /// Advances by one communication step of `step_size` s, from the inputs at its start.
+    /// Advances by one communication step of `step_size` s, from the inputs at its start. A tip that was free and is to be
+    /// driven begins with the motion it has, and is led to the inputs; one that was driven and is to be free goes on from it.
     ///
     /// # Errors
     /// [`Error`]; the unit is then exactly as before and the call may be repeated.
@@ -716,16 +918,41 @@ impl Unit {
                 allowed: Allowed::Positive,
             });
         }
-        if let Some(step) = self.step.filter(|step| step_size / step > MAX_INTERNAL_STEPS) {
+        let [was_driven, is_driven] = self.driven;
+        if is_driven {
+            inputs.validate_tip()?;
+        }
+        if (self.steps_equally || is_driven) && step_size / self.step > MAX_INTERNAL_STEPS {
             let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
-            return Err(Error::NotAllowed { name: "step", value: step, allowed });
+            return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
         }
         let segment = self.path.segment(&inputs.sample(), step_size);
+        let catches = is_driven && !was_driven;
+        let tip = is_driven.then(|| {
+            let sample = inputs.tip_sample();
+            if catches {
+                self.catch(&sample).segment(&sample, step_size)
+            } else {
+                self.tip_path.segment(&sample, step_size)
+            }
+        });
+        let distance = |time: f64| {
+            let apart = |tip: &Segment| (tip.at(time).position - segment.at(time).position).norm();
+            tip.as_ref().map_or(0.0, apart)
+        };
+        let parameters = &self.start.parameters;
+        if let Err(error) = parameters.reaches(distance(step_size), 1.0) {
+            if catches {
+                self.integrator.restore();
+            }
+            return Err(error);
+        }
         let gravity = self.gravity;
         let drive = |time: f64| {
             let (jerk, angular_acceleration) = segment.rates(time);
             Drive {
                 boundary: Boundary {
+                    tip: tip.as_ref().map_or(Support::free(), |tip| tip.at(time)),
                     tip_force: inputs.tip_force,
                     tip_moment: inputs.tip_moment,
                     ..Boundary::hanging_from(segment.at(time), gravity)
@@ -733,38 +960,58 @@ impl Unit {
                 rates: Rates { jerk, angular_acceleration, ..Rates::default() },
             }
         };
-        let done = self.integrator.advance(&drive, step_size);
-        done.map_err(|Failed { time, step, cause }| match self.quasi_static {
-            true => Error::NoEquilibriumNearby { time, cause },
-            false => Error::Diverged { time, step, cause },
+        let integrator = &mut self.integrator;
+        let done = if catches { integrator.go_on(&drive, step_size) } else { integrator.advance(&drive, step_size) };
+        done.map_err(|Failed { time, step, cause }| {
+            match (parameters.reaches(distance(time + step), TAUT), self.quasi_static) {
+                (Err(error), _) => error,
+                (Ok(()), true) => Error::NoEquilibriumNearby { time, cause },
+                (Ok(()), false) => Error::Diverged { time, step, cause },
+            }
         })?;
-        let warning = self.disagreement(&segment, step_size);
+        let of_base = self.disagreement(BASE, &segment, step_size);
+        let of_tip = || tip.as_ref().and_then(|tip| self.disagreement(TIP, tip, step_size));
+        let warning = of_base.or_else(of_tip);
         self.path = segment.into_path();
+        if let Some(tip) = tip {
+            self.tip_path = tip.into_path();
+        }
+        self.driven = [is_driven; 2];
         self.read_out(inputs);
         Ok(warning)
     }
 
-    fn disagreement(&mut self, segment: &Segment, step_size: f64) -> Option<Warning> {
-        let base = self.path.base();
+    /// The motion of a tip that is free so far, to be led to `sample`; the rod is ready for it.
+    fn catch(&mut self, sample: &Sample) -> Path {
+        let boundary = Boundary::hanging_from(*self.path.base(), self.gravity);
+        self.integrator.prepare_to_hold(&boundary, self.longest_cell);
+        let Ends { position, rotation, velocity, angular_velocity, .. } = self.integrator.ends();
+        let present = Sample { position, rotation, velocity, angular_velocity };
+        Path::caught(given(self.start.parameters.tip_motion), &present, sample)
+    }
+
+    fn disagreement(&mut self, end: End, segment: &Segment, step_size: f64) -> Option<Warning> {
+        let End { place, name, pose, twist } = end;
+        let Support { velocity, angular_velocity, .. } = segment.start();
         let length = self.integrator.length();
-        let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * base.velocity.norm();
-        let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * base.angular_velocity.norm();
-        if self.warned || !(far || turned) {
+        let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * velocity.norm();
+        let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * angular_velocity.norm();
+        if self.warned[place] || !(far || turned) {
             return None;
         }
-        self.warned = true;
-        Some(if far {
-            let names = ["base.position", "base.velocity"];
-            Warning::PoseAndTwistDisagree { names, distance: segment.distance, unit: "m" }
-        } else {
-            let names = ["base.orientation", "base.angular_velocity"];
-            Warning::PoseAndTwistDisagree { names, distance: segment.angle, unit: "rad" }
-        })
+        self.warned[place] = true;
+        let (k, distance, unit) = if far { (0, segment.distance, "m") } else { (1, segment.angle, "rad") };
+        Some(Warning::PoseAndTwistDisagree { end: name, names: [pose[k], twist[k]], distance, unit })
     }
 
     /// Sets gravity from the next step on.
     pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
         self.gravity = gravity;
+    }
+
+    /// Sets `tip_mode` from the next step on.
+    pub fn set_tip_mode(&mut self, mode: i32) {
+        self.driven[1] = mode == 1;
     }
 
     /// The outputs at the present communication point.
@@ -782,13 +1029,15 @@ impl Unit {
     /// # Errors
     /// [`Error::NoEquilibrium`] if its stiffness is singular.
     pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
-        let boundary = Boundary::hanging_from(*self.path.base(), self.gravity);
+        let tip = if self.driven[0] { *self.tip_path.base() } else { Support::free() };
+        let boundary = Boundary { tip, ..Boundary::hanging_from(*self.path.base(), self.gravity) };
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
     fn read_out(&mut self, inputs: &Inputs) {
         let (integrator, base) = (&self.integrator, self.path.base());
-        let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
+        let Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment } =
+            integrator.ends();
         self.outputs = Outputs {
             tip_position: position,
             tip_orientation: so3::quaternion(&rotation),
@@ -796,9 +1045,12 @@ impl Unit {
             tip_angular_velocity: angular_velocity,
             base_reaction_force: force,
             base_reaction_moment: moment,
+            tip_reaction_force: tip_force,
+            tip_reaction_moment: tip_moment,
             energy: *integrator.energy(),
             power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
-            power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
+            power_tip: (inputs.tip_force - tip_force).dot(&velocity)
+                + (inputs.tip_moment - tip_moment).dot(&angular_velocity),
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
             ..self.outputs
@@ -808,7 +1060,9 @@ impl Unit {
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static });
+archived!(Unit { integrator, gravity, path, tip_path, driven, warned, outputs } but {
+    start, step, steps_equally, longest_cell, quasi_static
+});
 
 /// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
 /// for bit as the one that was saved.

@@ -71,7 +71,7 @@ fn simulate_runs_the_default_experiment() {
     let times = column(&table, "time");
     assert_eq!(times.len(), 1 + (STOP_TIME / STEP_SIZE).round() as usize);
     assert_eq!((times[0], times[times.len() - 1]), (0.0, STOP_TIME));
-    assert_eq!(table.len(), 1 + 13 + 6 + 33 + 6 + 2 + 8);
+    assert_eq!(table.len(), 1 + 13 + 12 + 33 + 6 + 2 + 8);
     assert!(table.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())));
     let height = column(&table, "tip.position[3]");
     assert!(height[0].abs() < 1e-12 && height[height.len() - 1] < -0.3);

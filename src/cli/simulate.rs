@@ -282,6 +282,7 @@ impl Experiment {
             clock = time + (end - time);
             let now = apply(time, &mut parameters);
             unit.set_gravity(parameters.gravity);
+            unit.set_tip_mode(parameters.tip_mode);
             let warning = unit.advance(&now, step).map_err(|error| Error::Diverged { time, error })?;
             tell(end, unit.outputs(), warning)?;
         }

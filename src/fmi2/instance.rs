@@ -621,6 +621,7 @@ impl Instance {
             self.now.unit = None;
         } else if let Some(unit) = &mut self.now.unit {
             unit.set_gravity(self.now.parameters.gravity);
+            unit.set_tip_mode(self.now.parameters.tip_mode);
         }
         Ok(None)
     }
