@@ -9,11 +9,11 @@
 //!
 //! Where the length of the steps is given, and for a rod that shears and stretches, they are generalized-α in space. One
 //! of those that diverges is halved, and its halves again if need be; if that does not help either, the rod is as it was
-//! before the interval.
+//! before the interval. So are those of a rod whose tip is held, and for as long as it is.
 
 use crate::alpha::Scheme;
 use crate::archive::{Archive, Archived, Corrupt, archived};
-use crate::boundary::{Boundary, Drive};
+use crate::boundary::{Boundary, Drive, Held};
 use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
 use crate::mesh::{Mesh, Origin};
@@ -23,6 +23,7 @@ use crate::refine::Refiner;
 use crate::rod::Rod;
 use crate::rosenbrock::{RODAS4, RODAS5P};
 use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
+use crate::span;
 use crate::stepper::{Attempt, Diverged, Reason, Stepper, singular};
 use nalgebra::{Matrix3, Vector3};
 
@@ -156,6 +157,10 @@ pub struct Ends {
     pub force: Vec3,
     /// Exerted on the base, about the base point, N·m.
     pub moment: Vec3,
+    /// Exerted on what holds the tip, N; zero where nothing does.
+    pub tip_force: Vec3,
+    /// Exerted on what holds the tip, about the tip point, N·m.
+    pub tip_moment: Vec3,
 }
 
 /// How long the steps of a method may be.
@@ -403,9 +408,35 @@ impl Integrator {
     /// [`Failed`]; the rod is then exactly as before.
     pub fn advance(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
         self.keep();
+        self.go_on(drive, duration)
+    }
+
+    /// Makes a rod whose tip was free ready to have it held from now on: in space, and on cells none of which is longer than
+    /// `longest`, m, unless they are given. `boundary` is what acted on it so far. [`Self::go_on`] is to follow, or
+    /// [`Self::restore`].
+    pub fn prepare_to_hold(&mut self, boundary: &Boundary, longest: f64) {
+        self.keep();
+        if self.way == Way::Static {
+            return;
+        }
+        self.leave_plane();
+        if let Some((refiner, _)) = &mut self.refiners {
+            // cells that cannot be started stay as they were
+            if refiner.halve(&mut self.stepper, boundary, longest) == Ok(true) {
+                self.see_energy(&boundary.gravity);
+            }
+        }
+    }
+
+    /// As [`Self::advance`], after [`Self::prepare_to_hold`]: what an error takes back begins there.
+    ///
+    /// # Errors
+    /// [`Failed`]; the rod is then exactly as before that.
+    pub fn go_on(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
+        let begin = drive(0.0).boundary;
         let done = match self.way {
-            Way::Accurate { .. } => self.follow(drive, duration),
-            Way::Equal => self.march(drive, duration),
+            Way::Accurate { .. } if begin.tip.held == Held::FREE => self.follow(drive, duration),
+            Way::Accurate { .. } | Way::Equal => self.catch(&begin).and_then(|()| self.march(drive, duration)),
             Way::Static => self.drift(drive, duration),
         };
         if done.is_err() {
@@ -448,6 +479,27 @@ impl Integrator {
         started
     }
 
+    /// Begins anew in space where the tip's support has come or gone, which changes the accelerations at once.
+    fn catch(&mut self, begin: &Boundary) -> Result<(), Failed> {
+        self.leave_plane();
+        if self.stepper.state.boundary.tip.held == begin.tip.held {
+            return Ok(());
+        }
+        if self.stepper.rod.is_extensible() {
+            // its accelerations have a history of their own
+            self.stepper.state.boundary.tip = begin.tip;
+            return Ok(());
+        }
+        self.stepper.accelerate(begin).map_err(|cause| Failed { time: 0.0, step: self.step, cause })
+    }
+
+    fn leave_plane(&mut self) {
+        if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
+            write(plane, &mut self.stepper);
+        }
+        self.in_plane = false;
+    }
+
     fn keep(&mut self) {
         let Self { in_plane, pace, simple, energy, effort, .. } = *self;
         self.before = Before { in_plane, pace, simple, energy, effort };
@@ -467,7 +519,8 @@ impl Integrator {
         }
     }
 
-    fn restore(&mut self) {
+    /// Makes the rod what it was before the interval.
+    pub fn restore(&mut self) {
         let Before { in_plane, pace, simple, energy, effort } = self.before;
         (self.in_plane, self.pace, self.simple) = (in_plane, pace, simple);
         (self.energy, self.effort) = (energy, effort);
@@ -886,30 +939,28 @@ impl Integrator {
         Ok(Course { begin, events: again.events.unwrap_or_default(), duration })
     }
 
-    /// The rod started anew under `boundary`, on the cells and with the damping that it has: in equilibrium if it `rests`,
-    /// else with its rest shape.
+    /// The rod started anew under `boundary`, on the cells and with the damping that it has: in equilibrium if it `rests`
+    /// or its tip is held, else with its rest shape. `time` is the shortest one in which gravity or stiffness move the whole
+    /// rod, s.
     ///
     /// # Errors
     /// [`Diverged`] if there is no such start near the present state.
-    pub fn restarted(&self, boundary: &Boundary, rests: bool) -> Result<Self, Diverged> {
+    pub fn restarted(&self, boundary: &Boundary, rests: bool, time: f64) -> Result<Self, Diverged> {
         let mut rod = self.clone();
         rod.leave_plane();
-        let stepper = &mut rod.stepper;
-        if rests {
+        let Self { stepper, way, .. } = &mut rod;
+        let is_held = boundary.tip.held != Held::FREE;
+        if rests || is_held {
             stepper.relax(boundary)?;
         } else {
             stepper.state = State::at_rest_shape(&stepper.mesh, &boundary.base);
         }
-        if rod.way != Way::Static {
-            rod.stepper.start(boundary)?;
+        let moves = is_held && span::set_in_motion(stepper, boundary, time)?;
+        if *way != Way::Static {
+            stepper.begin(boundary, moves)?;
         }
         rod.see_energy(&boundary.gravity);
         Ok(rod)
-    }
-
-    fn leave_plane(&mut self) {
-        self.in_space();
-        self.in_plane = false;
     }
 
     /// Goes through a course again, in space: a step in a plane like one of order 4.
@@ -995,9 +1046,11 @@ impl Integrator {
         if let Some(plane) = self.plane() {
             let (Tip { position, velocity, rotation, angular_velocity }, (force, moment)) =
                 (plane.tip(), plane.reaction());
-            return Ends { position, rotation, velocity, angular_velocity, force, moment };
+            let (tip_force, tip_moment) = Default::default();
+            return Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment };
         }
-        let state = &self.stepper.state;
+        let Stepper { state, rod, .. } = &self.stepper;
+        let (tip_force, tip_moment) = state.tip_reaction(rod);
         let (tip, memory, base) = (state.tip(), state.tip_memory(), &state.nodes[0]);
         Ends {
             position: tip.position,
@@ -1006,6 +1059,8 @@ impl Integrator {
             angular_velocity: tip.rotation * memory.spin.velocity.value,
             force: base.force,
             moment: base.moment,
+            tip_force: Vec3::zeros() - tip_force,
+            tip_moment: Vec3::zeros() - tip_moment,
         }
     }
 
@@ -1087,7 +1142,7 @@ impl Course {
             rod.damp(damping).map_err(|cause| Failed { time: 0.0, step: 0.0, cause })?;
         }
         match rod.way {
-            Way::Accurate { .. } => {
+            Way::Accurate { .. } if drive(0.0).boundary.tip.held == Held::FREE => {
                 if in_plane {
                     rod.choose(drive, self.duration);
                 }
@@ -1097,7 +1152,7 @@ impl Course {
                 }
             }
             // steps of equal length, and none, need nothing settled
-            Way::Equal | Way::Static => rod.advance(drive, self.duration)?,
+            _ => rod.advance(drive, self.duration)?,
         }
         Ok(rod)
     }

@@ -10,7 +10,8 @@
 //! The modules stand in the order of reading, which is the order of dependence:
 //!
 //! ```text
-//! host =C=> fmi2 -> sensitivity -> unit -> {path, modes, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
+//! host =C=> fmi2 -> sensitivity -> unit -> {path, integrator},  integrator -> {refine, lateral} -> {plane, stepper}
+//!                       integrator, unit -> span -> modes -> stepper
 //!                       stepper -> {runge_kutta, pose},  pose -> sweep,  plane -> {rosenbrock, pose}
 //!      examples, tests -> rate -> formulation -> {energy, stepper}
 //!                       pose, rate -> {alpha, boundary, rod, mesh, archive, so3},  unit -> rest -> mesh
@@ -74,6 +75,7 @@ pub mod refine;
 pub mod formulation;
 pub mod rate;
 pub mod modes;
+pub mod span;
 pub mod integrator;
 pub mod path;
 pub mod unit;

@@ -1,4 +1,4 @@
-//! The motion of the base between communication points: one C¹ path through what the host samples.
+//! The motion of a driven end between communication points: one C¹ path through what the host samples.
 //!
 //! Within a communication step of length H the acceleration of the path is linear in time; the path begins with the
 //! velocity it had and ends with
@@ -125,7 +125,18 @@ impl Path {
         Self { given, base, last, rate: Twist::default(), jerk: Twist::default(), last_step: 0.0, samples: 0 }
     }
 
-    /// The base at the last communication point.
+    /// A path that begins with the motion `present` of an end, whatever it did before, and is led to the samples of which
+    /// `first` is the first one.
+    pub fn caught(given: Given, present: &Sample, first: &Sample) -> Self {
+        let mut path = Self::new(given, *present);
+        (path.base.velocity, path.base.angular_velocity) = (present.velocity, present.angular_velocity);
+        // a twist that is not given is that of the end until a second pose tells
+        let twist = if given == Given::Pose { present } else { first };
+        path.last = Sample { velocity: twist.velocity, angular_velocity: twist.angular_velocity, ..*first };
+        path
+    }
+
+    /// The end at the last communication point.
     pub fn base(&self) -> &Support {
         &self.base
     }
@@ -202,6 +213,11 @@ impl Path {
 }
 
 impl Segment {
+    /// The end at the start of the step.
+    pub fn start(&self) -> &Support {
+        &self.start
+    }
+
     /// The way since the start of the step, its rate and that of its rate.
     fn coordinates(&self, time: f64) -> [Twist; 3] {
         let Support { velocity, angular_velocity, .. } = self.start;
@@ -214,7 +230,7 @@ impl Segment {
         ]
     }
 
-    /// The base `time` s after the start of the step.
+    /// The end `time` s after the start of the step.
     pub fn at(&self, time: f64) -> Support {
         let Support { position, rotation, .. } = self.start;
         let [moved, twist, acceleration] = self.coordinates(time);

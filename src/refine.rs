@@ -349,6 +349,30 @@ impl Refiner {
         Ok(true)
     }
 
+    /// Halves the cells of a rod as for [`Self::adapt`] until none is longer than `longest`, m, as far as there is room;
+    /// whether they have changed.
+    ///
+    /// # Errors
+    /// [`Diverged`] if the equations of a cell are singular; the rod then has the cells that it got to.
+    pub fn halve(&mut self, stepper: &mut Stepper, boundary: &Boundary, longest: f64) -> Result<bool, Diverged> {
+        let mut changed = false;
+        loop {
+            self.estimate_space(stepper);
+            // lengths halve exactly, the longest one is rounded
+            let is_long = |cell: &Cell| cell.length > longest * (1.0 + 1e-9);
+            self.lately.clear();
+            self.lately.extend(stepper.mesh.cells.iter().map(|cell| if is_long(cell) { f64::INFINITY } else { 0.0 }));
+            let more = self.plan(&stepper.mesh, false);
+            self.lately.fill(0.0);
+            if !more {
+                return Ok(changed);
+            }
+            self.kept.fill(0.0);
+            self.change(stepper, boundary)?;
+            changed = true;
+        }
+    }
+
     /// Whether the step that `stepper` has attempted ends in errors that its cells ought not to have had: then the present
     /// state has finer ones, under `boundary`, and the step is to be attempted again. Cells that wait at rest for a blow
     /// are few.

@@ -38,6 +38,10 @@ pub fn nowhere() -> Acting {
             base_angular_velocity: zero,
             tip_force: zero,
             tip_moment: zero,
+            tip_position: zero,
+            tip_orientation: Vector4::zeros(),
+            tip_velocity: zero,
+            tip_angular_velocity: zero,
         },
         tunable: Tunable::default(),
     }
@@ -89,18 +93,23 @@ fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
             base_angular_velocity: from.base_angular_velocity + by.base_angular_velocity * distance,
             tip_force: from.tip_force + by.tip_force * distance,
             tip_moment: from.tip_moment + by.tip_moment * distance,
+            tip_position: from.tip_position + by.tip_position * distance,
+            tip_orientation: from.tip_orientation + by.tip_orientation * distance,
+            tip_velocity: from.tip_velocity + by.tip_velocity * distance,
+            tip_angular_velocity: from.tip_angular_velocity + by.tip_angular_velocity * distance,
         },
         tunable: Tunable {
             gravity: held.gravity + tuned.gravity * distance,
             damping_bending: held.damping_bending + tuned.damping_bending * distance,
             damping_twist: held.damping_twist + tuned.damping_twist * distance,
             damping_drag: held.damping_drag + tuned.damping_drag * distance,
+            tip_mode: held.tip_mode,
         },
     }
 }
 
-/// How many times `direction` moves the rod as far as it is long, in the time in which gravity or stiffness do. The base
-/// gets to its velocity, and to a position that its velocity is derived of, within the step.
+/// How many times `direction` moves the rod as far as it is long, in the time in which gravity or stiffness do. The ends
+/// get to their velocity, and to a position that its velocity is derived of, within the step.
 fn size(direction: &Acting, response: &Response) -> f64 {
     let parameters = response.parameters();
     let (rod, length) = (parameters.rod(), parameters.length);
@@ -109,14 +118,19 @@ fn size(direction: &Acting, response: &Response) -> f64 {
     let mass = rod.mass_per_length * length + rod.tip_mass;
     let weight = mass * response.acting().tunable.gravity.norm();
     let force = weight.max(rod.stiffness.max() / (length * length));
-    let turn = if parameters.base_motion == 1 { (step / time).powi(2) } else { step / time };
     let rate = step / (time * time);
-    let Acting { inputs, tunable } = direction;
+    let turn = |motion: i32| if motion == 1 { (step / time).powi(2) } else { step / time };
+    let (base, tip) = (turn(parameters.base_motion), turn(parameters.tip_motion));
+    let (Acting { inputs, tunable }, acting) = (direction, response.acting());
     [
-        inputs.base_position.norm() / (length * turn),
-        inputs.base_orientation.norm() / (response.acting().inputs.base_orientation.norm() * turn),
+        inputs.base_position.norm() / (length * base),
+        inputs.base_orientation.norm() / (acting.inputs.base_orientation.norm() * base),
         inputs.base_velocity.norm() / (length * rate),
         inputs.base_angular_velocity.norm() / rate,
+        inputs.tip_position.norm() / (length * tip),
+        inputs.tip_orientation.norm() / (acting.inputs.tip_orientation.norm() * tip),
+        inputs.tip_velocity.norm() / (length * rate),
+        inputs.tip_angular_velocity.norm() / rate,
         inputs.tip_force.norm() / force,
         inputs.tip_moment.norm() * length / rod.stiffness.min(),
         tunable.gravity.norm() * time * time / length,

@@ -801,6 +801,19 @@ impl Stepper {
         Ok(())
     }
 
+    /// As [`Self::start`], of a rod that `moves` other than as one rigid body: the rates of its accelerations are then not
+    /// known, and those that it keeps if it shears or stretches are its own.
+    ///
+    /// # Errors
+    /// [`Diverged`] as of [`Self::start`].
+    pub fn begin(&mut self, boundary: &Boundary, moves: bool) -> Result<(), Diverged> {
+        match moves {
+            true if self.rod.is_extensible() => Ok(()),
+            true => self.accelerate(boundary),
+            false => self.start(boundary),
+        }
+    }
+
     /// Consistent accelerations as [`Self::start`], without their rates: where what acts has jumped.
     ///
     /// # Errors

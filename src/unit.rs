@@ -1,6 +1,6 @@
 //! The model without FMI: parameters and inputs in, one rod advanced by communication steps, outputs out.
 //!
-//! Between two communication points the base follows a path through what the host samples ([`crate::path`]) and the
+//! Between two communication points the base, and a driven tip, follow a path through what the host samples ([`crate::path`]) and the
 //! rod is moved to the tolerance ([`crate::integrator`]). What the host may set is checked here, and errors name it.
 
 use crate::alpha::Scheme;
@@ -16,10 +16,11 @@ use crate::refine::Refiner;
 use crate::rest::RestShape;
 use crate::rod::Rod;
 use crate::so3;
+use crate::span;
 use crate::stepper::{Diverged, Stepper};
 use nalgebra::{Matrix3, Vector3, Vector4};
 use std::f64::consts::PI;
-use std::{fmt, mem};
+use std::fmt;
 
 /// Number of stations of the centreline handed out for drawing, base and tip included.
 pub const STATIONS: usize = 11;
@@ -63,6 +64,10 @@ pub struct Parameters {
     pub extensible: bool,
     /// 0 pose and twist are given, 1 pose only, 2 twist only.
     pub base_motion: i32,
+    /// 0 the tip is free and loaded, 1 it is driven; may change between steps.
+    pub tip_mode: i32,
+    /// As `base_motion`, of a driven tip.
+    pub tip_motion: i32,
     /// Cells along the rod; 0 = chosen here.
     pub cells: i32,
     /// Gauss points in a cell, 1 to 4; 0 = chosen here.
@@ -104,6 +109,8 @@ archived!(Parameters {
     tip_inertia,
     extensible,
     base_motion,
+    tip_mode,
+    tip_motion,
     cells,
     stages,
     step,
@@ -138,6 +145,8 @@ impl Default for Parameters {
             tip_inertia: 0.0,
             extensible: false,
             base_motion: 0,
+            tip_mode: 0,
+            tip_motion: 0,
             cells: 0,
             stages: 0,
             step: 0.0,
@@ -163,9 +172,11 @@ pub struct Tunable {
     pub damping_twist: f64,
     /// N·s/m².
     pub damping_drag: f64,
+    /// 0 or 1.
+    pub tip_mode: i32,
 }
 
-archived!(Tunable { gravity, damping_bending, damping_twist, damping_drag });
+archived!(Tunable { gravity, damping_bending, damping_twist, damping_drag, tip_mode });
 
 /// What the host gives at every communication point, world frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -182,12 +193,32 @@ pub struct Inputs {
     pub tip_force: Vector3<f64>,
     /// Dead moment on the tip, about the tip point, N·m.
     pub tip_moment: Vector3<f64>,
+    /// Position of a driven tip, m.
+    pub tip_position: Vector3<f64>,
+    /// Orientation of a driven tip, as that of the base.
+    pub tip_orientation: Vector4<f64>,
+    /// Velocity of a driven tip, m/s.
+    pub tip_velocity: Vector3<f64>,
+    /// Angular velocity of a driven tip, rad/s.
+    pub tip_angular_velocity: Vector3<f64>,
 }
 
-archived!(Inputs { base_position, base_orientation, base_velocity, base_angular_velocity, tip_force, tip_moment });
+archived!(Inputs {
+    base_position,
+    base_orientation,
+    base_velocity,
+    base_angular_velocity,
+    tip_force,
+    tip_moment,
+    tip_position,
+    tip_orientation,
+    tip_velocity,
+    tip_angular_velocity,
+});
 
 impl Default for Inputs {
-    /// A base at rest from which the rod leaves along +x, no loads.
+    /// A base at rest from which the rod leaves along +x, no loads; a driven tip half a metre away that points there as
+    /// well.
     fn default() -> Self {
         Self {
             base_position: Vector3::zeros(),
@@ -196,6 +227,10 @@ impl Default for Inputs {
             base_angular_velocity: Vector3::zeros(),
             tip_force: Vector3::zeros(),
             tip_moment: Vector3::zeros(),
+            tip_position: Vector3::x() * 0.5,
+            tip_orientation: Vector4::new(0.5f64.sqrt(), 0.0, 0.5f64.sqrt(), 0.0),
+            tip_velocity: Vector3::zeros(),
+            tip_angular_velocity: Vector3::zeros(),
         }
     }
 }
@@ -215,6 +250,10 @@ pub struct Outputs {
     pub base_reaction_force: Vector3<f64>,
     /// Moment the rod exerts on its base, about the base point, N·m.
     pub base_reaction_moment: Vector3<f64>,
+    /// Force the rod exerts on what drives its tip, N; zero where nothing does.
+    pub tip_reaction_force: Vector3<f64>,
+    /// Moment the rod exerts on what drives its tip, about the tip point, N·m; zero where nothing does.
+    pub tip_reaction_moment: Vector3<f64>,
     /// Points of the centreline at equal arc lengths, first the base, last the tip, m.
     pub stations: [Vector3<f64>; STATIONS],
     /// Energies and works.
@@ -240,6 +279,8 @@ archived!(Outputs {
     tip_angular_velocity,
     base_reaction_force,
     base_reaction_moment,
+    tip_reaction_force,
+    tip_reaction_moment,
     stations,
     energy,
     power_base,
@@ -333,6 +374,20 @@ pub enum Error {
         /// The lowest ω², 1/s².
         omega_squared: f64,
     },
+    /// No equilibrium with the tip where it is to be driven from can be reached.
+    NotHeld(Diverged),
+    /// The only equilibria between the two ends that were found are unstable.
+    HeldUnstably {
+        /// The lowest ω², 1/s².
+        omega_squared: f64,
+    },
+    /// The ends are to be further apart than a rod reaches that does not stretch, or nearly so.
+    OutOfReach {
+        /// Between the ends, m.
+        distance: f64,
+        /// Of the rod, m.
+        length: f64,
+    },
     /// The equations of motion at the start are singular.
     NoStart(Diverged),
     /// There is no step that the outputs could be differentiated in.
@@ -366,6 +421,22 @@ impl fmt::Display for Error {
                 f,
                 "start_in_equilibrium: the static equilibrium is unstable (lowest squared frequency {omega_squared:.3e} 1/s2)"
             ),
+            Self::NotHeld(cause) => {
+                write!(
+                    f,
+                    "tip.mode = 1: no static equilibrium between the ends can be reached from the rest shape ({cause})"
+                )
+            }
+            Self::HeldUnstably { omega_squared } => write!(
+                f,
+                "tip.mode = 1: the static equilibria between the ends that were found are unstable (lowest squared frequency \
+                 {omega_squared:.3e} 1/s2)"
+            ),
+            Self::OutOfReach { distance, length } => write!(
+                f,
+                "the driven tip is {distance:.6} m from the base, too far for a rod with length = {length} m that does not \
+                 stretch: bring tip.driven_position nearer to base.position, or set extensible = true"
+            ),
             Self::NoStart(cause) => write!(f, "the equations of motion at the start have no solution ({cause})"),
             Self::NoStep => write!(
                 f,
@@ -391,8 +462,10 @@ impl std::error::Error for Error {}
 /// Something the host should know although the step succeeded; each kind is given once in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Pose and twist of the base do not belong to one motion.
+    /// Pose and twist of the base, or of a driven tip, do not belong to one motion.
     PoseAndTwistDisagree {
+        /// Which end.
+        end: &'static str,
         /// Names of the two variables.
         names: [&'static str; 2],
         /// How far apart they have run.
@@ -405,10 +478,10 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PoseAndTwistDisagree { names: [pose, twist], distance, unit } => write!(
+            Self::PoseAndTwistDisagree { end, names: [pose, twist], distance, unit } => write!(
                 f,
-                "{pose} and the motion that {twist} describes are {distance:.3e} {unit} apart; the base follows {twist} and \
-                 is led back slowly (base.motion = 1 takes the pose alone, 2 the twist alone)"
+                "{pose} and the motion that {twist} describes are {distance:.3e} {unit} apart; the {end} follows {twist} and \
+                 is led back slowly ({end}.motion = 1 takes the pose alone, 2 the twist alone)"
             ),
         }
     }
@@ -418,8 +491,32 @@ impl fmt::Display for Warning {
 /// disagree; half a communication step's motion is allowed on top, since the first steps do not know the acceleration.
 const DISAGREEMENT: f64 = 0.02;
 
+/// Distance of the ends over the length from which on a rod that does not stretch and cannot be moved is taken for taut.
+const TAUT: f64 = 0.98;
+
 /// Internal steps in a communication step beyond which the host has asked for something else than it wants.
 const MAX_INTERNAL_STEPS: f64 = 1e7;
+
+/// An end of the rod with a path, in the words of the warning.
+struct End {
+    place: usize,
+    name: &'static str,
+    pose: [&'static str; 2],
+    twist: [&'static str; 2],
+}
+
+const BASE: End = End {
+    place: 0,
+    name: "base",
+    pose: ["base.position", "base.orientation"],
+    twist: ["base.velocity", "base.angular_velocity"],
+};
+const TIP: End = End {
+    place: 1,
+    name: "tip",
+    pose: ["tip.driven_position", "tip.driven_orientation"],
+    twist: ["tip.driven_velocity", "tip.driven_angular_velocity"],
+};
 
 /// What a rod was started from: it settles all that is fixed, and how much room there is.
 #[derive(Clone, Debug, Default)]
@@ -433,14 +530,17 @@ struct Start {
 archived!(Start { parameters, inputs, tolerance });
 
 impl Start {
-    /// A path that begins where these inputs say.
-    fn path(&self, inputs: &Inputs) -> Path {
-        let given = match self.parameters.base_motion {
-            0 => Given::PoseAndTwist,
-            1 => Given::Pose,
-            _ => Given::Twist,
-        };
-        Path::new(given, inputs.sample())
+    /// Paths that begin where these inputs say.
+    fn paths(&self, inputs: &Inputs) -> Paths {
+        let Parameters { base_motion, tip_mode, .. } = self.parameters;
+        Paths {
+            base: Path::new(given(base_motion), inputs.sample()),
+            tip: (tip_mode == 1).then(|| self.tip_path(inputs)),
+        }
+    }
+
+    fn tip_path(&self, inputs: &Inputs) -> Path {
+        Path::new(given(self.parameters.tip_motion), inputs.tip_sample())
     }
 }
 
@@ -449,21 +549,65 @@ impl Start {
 pub struct Unit {
     start: Start,
     integrator: Integrator,
-    /// Longest internal step, where the host gives it, s.
-    step: Option<f64>,
+    /// Longest step of generalized-α, s.
+    step: f64,
+    /// Whether there are no others, whatever holds the tip.
+    steps_equally: bool,
+    /// Longest cell of a rod whose tip is held, m.
+    longest_cell: f64,
     quasi_static: bool,
     tunable: Tunable,
     path: Path,
-    warned: bool,
+    /// Of the tip, of no use where it is free.
+    tip_path: Path,
+    /// Whether the tip is driven at present.
+    driven: bool,
+    /// Of the base, and of the tip.
+    warned: [bool; 2],
     outputs: Outputs,
     /// The last communication step, as long as the integrator knows where it began.
     last: Option<Last>,
 }
 
-/// A communication step: the path before it, what acted in it, its length in s.
+/// The paths of both ends, of the tip if it is driven.
+#[derive(Clone, Debug)]
+struct Paths {
+    base: Path,
+    tip: Option<Path>,
+}
+
+/// The same within one communication step.
+#[derive(Clone, Debug)]
+struct Segments {
+    base: Segment,
+    tip: Option<Segment>,
+}
+
+impl Paths {
+    /// Over the next `step` s.
+    fn segments(&self, inputs: &Inputs, step: f64) -> Segments {
+        let tip = self.tip.as_ref().map(|tip| tip.segment(&inputs.tip_sample(), step));
+        Segments { base: self.base.segment(&inputs.sample(), step), tip }
+    }
+}
+
+impl Segments {
+    /// Distance of the ends `time` s after the start of the step, m; 0 where the tip is free.
+    fn apart(&self, time: f64) -> f64 {
+        let apart = |tip: &Segment| (tip.at(time).position - self.base.at(time).position).norm();
+        self.tip.as_ref().map_or(0.0, apart)
+    }
+
+    /// The paths at the end of the step.
+    fn into_paths(self) -> Paths {
+        Paths { base: self.base.into_path(), tip: self.tip.map(Segment::into_path) }
+    }
+}
+
+/// A communication step: the paths before it, what acted in it, its length in s.
 #[derive(Clone, Debug)]
 struct Last {
-    path: Path,
+    paths: Paths,
     acting: Acting,
     duration: f64,
 }
@@ -498,7 +642,7 @@ fn allow(mut numbers: impl Iterator<Item = Number>) -> Result<(), Error> {
 
 impl Tunable {
     fn numbers(&self) -> impl Iterator<Item = Number> + use<> {
-        use Allowed::{Finite, NonNegative};
+        use Allowed::{Choice, Finite, NonNegative};
         let g = self.gravity;
         let numbers = [
             ("gravity[1]", g.x, Finite),
@@ -507,6 +651,7 @@ impl Tunable {
             ("damping.bending", self.damping_bending, NonNegative),
             ("damping.twist", self.damping_twist, NonNegative),
             ("damping.drag", self.damping_drag, NonNegative),
+            ("tip.mode", f64::from(self.tip_mode), Choice(0, 1)),
         ];
         numbers.into_iter()
     }
@@ -526,14 +671,14 @@ impl Parameters {
 
     /// Those that may change between steps.
     pub fn tunable(&self) -> Tunable {
-        let Self { gravity, damping_bending, damping_twist, damping_drag, .. } = *self;
-        Tunable { gravity, damping_bending, damping_twist, damping_drag }
+        let Self { gravity, damping_bending, damping_twist, damping_drag, tip_mode, .. } = *self;
+        Tunable { gravity, damping_bending, damping_twist, damping_drag, tip_mode }
     }
 
     /// The same with others that may change.
     pub fn tuned(&self, tunable: &Tunable) -> Self {
-        let Tunable { gravity, damping_bending, damping_twist, damping_drag } = *tunable;
-        Self { gravity, damping_bending, damping_twist, damping_drag, ..self.clone() }
+        let Tunable { gravity, damping_bending, damping_twist, damping_drag, tip_mode } = *tunable;
+        Self { gravity, damping_bending, damping_twist, damping_drag, tip_mode, ..self.clone() }
     }
 
     /// The section's numbers as the library takes them.
@@ -579,6 +724,7 @@ impl Parameters {
             ("tip.mass", self.tip_mass, NonNegative),
             ("tip.inertia", self.tip_inertia, NonNegative),
             ("base.motion", f64::from(self.base_motion), Choice(0, 2)),
+            ("tip.motion", f64::from(self.tip_motion), Choice(0, 2)),
             ("cells", f64::from(self.cells), Choice(0, MAX_CELLS)),
             ("stages", f64::from(self.stages), Choice(0, MAX_STAGES as i32)),
             ("step", self.step, NonNegative),
@@ -622,29 +768,45 @@ impl Parameters {
             return Ok((mesh, None));
         }
         let in_cells = |cells: usize| shape.mesh(self.length, more, cells, COARSEST_TURN, stages);
+        if self.extensible || self.step > 0.0 || self.quasi_static {
+            let cells = self.cells_enough(rod, boundary, tolerance, ENOUGH);
+            let cells = if self.tip_mode == 1 { cells.max(CELLS_BETWEEN_ENDS) } else { cells };
+            return Ok((in_cells(cells.max(turn) as usize), None));
+        }
+        let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
+        let coarsest = in_cells((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let most = likely.max(turn).max(coarsest.cells.len() as f64);
+        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
+        // the motion to come is not seen at the start
+        let cells = if self.tip_mode == 1 { self.length / self.longest_cell(rod, boundary, tolerance) } else { likely };
+        Ok((refiner.start(cells as usize), Some(refiner)))
+    }
+
+    /// Equal cells that are right to `tolerance`: `part` of the lengths in which loads bend the rod, at the tolerance
+    /// `reference`, and more by the power `grows` of the order below it.
+    fn cells_enough(
+        &self,
+        rod: &Rod,
+        boundary: &Boundary,
+        tolerance: f64,
+        Cells { part, reference, grows }: Cells,
+    ) -> f64 {
         // loads bend a rod within (EI/w)^(1/3) of where it is held
         let load = rod.mass_per_length * self.gravity.norm()
             + (rod.tip_mass * self.gravity.norm() + boundary.tip_force.norm()) / self.length;
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
         let wound = boundary.tip_moment.norm() * self.length / softest;
+        let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
         let order = 2.0 * stages as f64;
-        let at_least = |cells: f64| {
-            let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
-            cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
-        };
-        if self.extensible || self.step > 0.0 || self.quasi_static {
-            // measured on a rope of seven such lengths, five cells of four points are right to 3e-4
-            let cells = at_least(0.7 * bends * (1e-3 / tolerance).powf(1.0 / order));
-            return Ok((in_cells(cells.max(turn) as usize), None));
-        }
-        // equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent
-        let likely = at_least(0.3 * bends * (1e-2 / tolerance).powf(1.8 / order));
-        let coarsest = in_cells((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
-        let most = likely.max(turn).max(coarsest.cells.len() as f64);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
-        // the motion to come is not seen at the start
-        Ok((refiner.start(likely as usize), Some(refiner)))
+        let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
+        let cells = part * bends * (reference / tolerance).powf(grows / order);
+        cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
+    }
+
+    /// The longest cell of a rod whose tip is held, m: its cells do not choose themselves.
+    fn longest_cell(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> f64 {
+        self.length / self.cells_enough(rod, boundary, tolerance, ENOUGH).max(CELLS_BETWEEN_ENDS)
     }
 
     /// The shortest time in which gravity or stiffness move the whole rod, s.
@@ -667,7 +829,10 @@ impl Parameters {
     /// [`Error`] names the parameter that is not allowed together with others, or says why there is no start.
     pub fn start(&self, boundary: &Boundary, tolerance: f64) -> Result<Integrator, Error> {
         let (mut stepper, mut refiner) = self.unstressed(boundary, tolerance)?;
-        if self.start_in_equilibrium || self.quasi_static {
+        let mut moves = false;
+        if self.tip_mode == 1 {
+            moves = self.start_between_ends(&mut stepper, boundary)?;
+        } else if self.start_in_equilibrium || self.quasi_static {
             let found = match &mut refiner {
                 Some(refiner) => {
                     stepper.reserve(refiner.most_cells());
@@ -683,9 +848,29 @@ impl Parameters {
         }
         let (way, scheme, step) = self.motion(&stepper.rod, tolerance);
         if way != Way::Static {
-            stepper.start(boundary).map_err(Error::NoStart)?;
+            stepper.begin(boundary, moves).map_err(Error::NoStart)?;
         }
         Ok(Integrator::new(stepper, refiner, way, scheme, step, boundary))
+    }
+
+    /// Leads the tip of the unstressed rod to where `boundary` drives it; whether the ends move other than as one body.
+    fn start_between_ends(&self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Error> {
+        let distance = (boundary.tip.position - boundary.base.position).norm();
+        self.reaches(distance, 1.0)?;
+        let cause = |diverged| self.reaches(distance, TAUT).err().unwrap_or(Error::NotHeld(diverged));
+        let omega_squared = span::hang(stepper, boundary).map_err(cause)?;
+        if omega_squared <= 0.0 {
+            return Err(Error::HeldUnstably { omega_squared });
+        }
+        span::set_in_motion(stepper, boundary, self.time(&stepper.rod)).map_err(cause)
+    }
+
+    /// Whether the rod reaches from end to end of `distance`, m, with `part` of its length.
+    fn reaches(&self, distance: f64, part: f64) -> Result<(), Error> {
+        match self.extensible || distance < part * self.length {
+            true => Ok(()),
+            false => Err(Error::OutOfReach { distance, length: self.length }),
+        }
     }
 
     /// The same rod where it has not been started.
@@ -716,6 +901,19 @@ impl Parameters {
     }
 }
 
+/// A rule for the number of cells.
+struct Cells {
+    part: f64,
+    reference: f64,
+    grows: f64,
+}
+
+/// Measured on a rope of seven such lengths, five cells of four points are right to 3e-4.
+const ENOUGH: Cells = Cells { part: 0.7, reference: 1e-3, grows: 1.0 };
+/// Equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent.
+const LIKELY: Cells = Cells { part: 0.3, reference: 1e-2, grows: 1.8 };
+/// Fewest cells of a rod between two ends: it may turn by more than a whole turn on its way, and a cell by less than one.
+const CELLS_BETWEEN_ENDS: f64 = 4.0;
 /// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
 const MAX_CELLS: i32 = 100_000;
 /// Most cells chosen here.
@@ -758,15 +956,33 @@ impl Inputs {
                 return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
             }
         }
-        let norm = self.base_orientation.norm();
-        if !(norm > 1e-100 && norm.is_finite()) {
-            return Err(Error::NotAllowed {
-                name: "base.orientation",
-                value: norm,
-                allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
-            });
+        is_orientation("base.orientation", &self.base_orientation)
+    }
+
+    /// The same for those that only a driven tip reads.
+    fn validate_tip(&self) -> Result<(), Error> {
+        const NAMES: [[&str; 3]; 3] = [
+            ["tip.driven_position[1]", "tip.driven_position[2]", "tip.driven_position[3]"],
+            ["tip.driven_velocity[1]", "tip.driven_velocity[2]", "tip.driven_velocity[3]"],
+            ["tip.driven_angular_velocity[1]", "tip.driven_angular_velocity[2]", "tip.driven_angular_velocity[3]"],
+        ];
+        let vectors = [&self.tip_position, &self.tip_velocity, &self.tip_angular_velocity];
+        let components = NAMES.iter().flatten().zip(vectors.into_iter().flatten());
+        for (name, value) in components {
+            if !value.is_finite() {
+                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
+            }
         }
-        Ok(())
+        is_orientation("tip.driven_orientation", &self.tip_orientation)
+    }
+
+    fn tip_sample(&self) -> Sample {
+        Sample {
+            position: self.tip_position,
+            rotation: so3::from_quaternion(&self.tip_orientation.normalize()),
+            velocity: self.tip_velocity,
+            angular_velocity: self.tip_angular_velocity,
+        }
     }
 
     fn sample(&self) -> Sample {
@@ -776,6 +992,27 @@ impl Inputs {
             velocity: self.base_velocity,
             angular_velocity: self.base_angular_velocity,
         }
+    }
+}
+
+fn is_orientation(name: &'static str, quaternion: &Vector4<f64>) -> Result<(), Error> {
+    let norm = quaternion.norm();
+    match norm > 1e-100 && norm.is_finite() {
+        true => Ok(()),
+        false => Err(Error::NotAllowed {
+            name,
+            value: norm,
+            allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
+        }),
+    }
+}
+
+/// What `base.motion` and `tip.motion` stand for.
+fn given(motion: i32) -> Given {
+    match motion {
+        0 => Given::PoseAndTwist,
+        1 => Given::Pose,
+        _ => Given::Twist,
     }
 }
 
@@ -798,25 +1035,33 @@ impl Unit {
         let Start { parameters, inputs, tolerance } = &start;
         parameters.validate()?;
         inputs.validate()?;
-        let given = |value: &f64| value.is_finite() && *value > 0.0;
-        let tolerance = Some(parameters.tolerance).filter(given).or(tolerance.filter(given)).unwrap_or(1e-3);
-        let path = start.path(inputs);
-        let boundary = Acting { inputs: inputs.clone(), tunable: parameters.tunable() }.on(*path.base());
+        let positive = |value: &f64| value.is_finite() && *value > 0.0;
+        let tolerance = Some(parameters.tolerance).filter(positive).or(tolerance.filter(positive)).unwrap_or(1e-3);
+        let driven = parameters.tip_mode == 1;
+        if driven {
+            inputs.validate_tip()?;
+        }
+        let paths = start.paths(inputs);
+        let boundary = Acting { inputs: inputs.clone(), tunable: parameters.tunable() }.at(&paths);
         Ok(Self {
             integrator: begin(parameters, &boundary, tolerance)?,
-            step: (parameters.step > 0.0 || parameters.extensible)
-                .then(|| parameters.longest_step(&parameters.rod(), tolerance)),
+            step: parameters.longest_step(&parameters.rod(), tolerance),
+            steps_equally: parameters.step > 0.0 || parameters.extensible,
+            longest_cell: parameters.longest_cell(&parameters.rod(), &boundary, tolerance),
             quasi_static: parameters.quasi_static,
             tunable: parameters.tunable(),
-            path,
-            warned: false,
+            tip_path: start.tip_path(inputs),
+            path: paths.base,
+            driven,
+            warned: [false; 2],
             outputs: Outputs::default(),
             last: None,
             start,
         })
     }
 
-    /// Advances by one communication step of `step_size` s, from the inputs at its start.
+    /// Advances by one communication step of `step_size` s, from the inputs at its start. A tip that was free and is to be
+    /// driven begins with the motion it has, and is led to the inputs; one that was driven and is to be free goes on from it.
     ///
     /// # Errors
     /// [`Error`]; the unit is then exactly as before and the call may be repeated.
@@ -829,26 +1074,54 @@ impl Unit {
                 allowed: Allowed::Positive,
             });
         }
-        if let Some(step) = self.step.filter(|step| step_size / step > MAX_INTERNAL_STEPS) {
+        let is_driven = self.tunable.tip_mode == 1;
+        if is_driven {
+            inputs.validate_tip()?;
+        }
+        if (self.steps_equally || is_driven) && step_size / self.step > MAX_INTERNAL_STEPS {
             let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
-            return Err(Error::NotAllowed { name: "step", value: step, allowed });
+            return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
         }
         self.last = None;
         let acting = Acting { inputs: inputs.clone(), tunable: self.tunable };
-        let segment = self.path.segment(&inputs.sample(), step_size);
-        let done = self.integrator.advance(&acting.along(&segment), step_size);
-        done.map_err(|failed| self.failure(failed))?;
-        let warning = self.disagreement(&segment, step_size);
-        let before = mem::replace(&mut self.path, segment.into_path());
-        self.last = Some(Last { path: before, acting, duration: step_size });
+        let catches = is_driven && !self.driven;
+        let tip = match (is_driven, catches) {
+            (false, _) => None,
+            (true, false) => Some(self.tip_path.clone()),
+            (true, true) => Some(self.catch(&inputs.tip_sample())),
+        };
+        let paths = Paths { base: self.path.clone(), tip };
+        let segments = paths.segments(inputs, step_size);
+        if let Err(error) = self.start.parameters.reaches(segments.apart(step_size), 1.0) {
+            if catches {
+                self.integrator.restore();
+            }
+            return Err(error);
+        }
+        let done = match catches {
+            true => self.integrator.go_on(&acting.along(&segments), step_size),
+            false => self.integrator.advance(&acting.along(&segments), step_size),
+        };
+        done.map_err(|failed| self.failure(failed, &segments))?;
+        let of_base = self.disagreement(BASE, &segments.base, step_size);
+        let of_tip = || segments.tip.as_ref().and_then(|tip| self.disagreement(TIP, tip, step_size));
+        let warning = of_base.or_else(of_tip);
+        let Paths { base, tip } = segments.into_paths();
+        self.path = base;
+        if let Some(tip) = tip {
+            self.tip_path = tip;
+        }
+        self.driven = is_driven;
+        self.last = Some(Last { paths, acting, duration: step_size });
         self.read_out(inputs);
         Ok(warning)
     }
 
-    fn failure(&self, Failed { time, step, cause }: Failed) -> Error {
-        match self.quasi_static {
-            true => Error::NoEquilibriumNearby { time, cause },
-            false => Error::Diverged { time, step, cause },
+    fn failure(&self, Failed { time, step, cause }: Failed, segments: &Segments) -> Error {
+        match (self.start.parameters.reaches(segments.apart(time + step), TAUT), self.quasi_static) {
+            (Err(error), _) => error,
+            (Ok(()), true) => Error::NoEquilibriumNearby { time, cause },
+            (Ok(()), false) => Error::Diverged { time, step, cause },
         }
     }
 
@@ -861,31 +1134,36 @@ impl Unit {
             None if self.path.has_begun() => return Err(Error::NoStep),
             None => None,
             Some(last) => {
-                let Last { path, acting, duration } = last;
-                let segment = path.segment(&acting.inputs.sample(), *duration);
-                let course = self.integrator.course(&acting.along(&segment), *duration);
-                Some((course.map_err(|failed| self.failure(failed))?, last))
+                let Last { paths, acting, duration } = last;
+                let segments = paths.segments(&acting.inputs, *duration);
+                let course = self.integrator.course(&acting.along(&segments), *duration);
+                Some((course.map_err(|failed| self.failure(failed, &segments))?, last))
             }
         };
         Ok(Response { unit: self, course })
     }
 
-    fn disagreement(&mut self, segment: &Segment, step_size: f64) -> Option<Warning> {
-        let base = self.path.base();
+    /// The motion of a tip that is free so far, to be led to `sample`; the rod is ready for it.
+    fn catch(&mut self, sample: &Sample) -> Path {
+        let boundary = Boundary::hanging_from(*self.path.base(), self.tunable.gravity);
+        self.integrator.prepare_to_hold(&boundary, self.longest_cell);
+        let Ends { position, rotation, velocity, angular_velocity, .. } = self.integrator.ends();
+        let present = Sample { position, rotation, velocity, angular_velocity };
+        Path::caught(given(self.start.parameters.tip_motion), &present, sample)
+    }
+
+    fn disagreement(&mut self, end: End, segment: &Segment, step_size: f64) -> Option<Warning> {
+        let End { place, name, pose, twist } = end;
+        let Support { velocity, angular_velocity, .. } = segment.start();
         let length = self.integrator.length();
-        let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * base.velocity.norm();
-        let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * base.angular_velocity.norm();
-        if self.warned || !(far || turned) {
+        let far = segment.distance > DISAGREEMENT * length + 0.5 * step_size * velocity.norm();
+        let turned = segment.angle > DISAGREEMENT + 0.5 * step_size * angular_velocity.norm();
+        if self.warned[place] || !(far || turned) {
             return None;
         }
-        self.warned = true;
-        Some(if far {
-            let names = ["base.position", "base.velocity"];
-            Warning::PoseAndTwistDisagree { names, distance: segment.distance, unit: "m" }
-        } else {
-            let names = ["base.orientation", "base.angular_velocity"];
-            Warning::PoseAndTwistDisagree { names, distance: segment.angle, unit: "rad" }
-        })
+        self.warned[place] = true;
+        let (k, distance, unit) = if far { (0, segment.distance, "m") } else { (1, segment.angle, "rad") };
+        Some(Warning::PoseAndTwistDisagree { end: name, names: [pose[k], twist[k]], distance, unit })
     }
 
     /// Sets what may change, from the next step on.
@@ -899,7 +1177,7 @@ impl Unit {
             return Ok(());
         }
         allow(tunable.numbers())?;
-        if *tunable != (Tunable { gravity: tunable.gravity, ..before }) {
+        if *tunable != (Tunable { gravity: tunable.gravity, tip_mode: tunable.tip_mode, ..before }) {
             self.last = None;
             let rod = tunable.damped(self.start.parameters.rod());
             self.integrator.damp(&rod).map_err(Error::NoStart)?;
@@ -923,7 +1201,8 @@ impl Unit {
     /// # Errors
     /// [`Error::NoEquilibrium`] if its stiffness is singular.
     pub fn modes(&mut self, count: usize) -> Result<Vec<Mode>, Error> {
-        let boundary = Boundary::hanging_from(*self.path.base(), self.tunable.gravity);
+        let tip = if self.driven { *self.tip_path.base() } else { Support::free() };
+        let boundary = Boundary { tip, ..Boundary::hanging_from(*self.path.base(), self.tunable.gravity) };
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
@@ -936,7 +1215,8 @@ impl Unit {
 impl Outputs {
     /// What is to be read of a rod on this base, after a step with these inputs; its effective mass if `masses` are wanted.
     fn read(&mut self, integrator: &mut Integrator, base: &Support, inputs: &Inputs, masses: bool) {
-        let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
+        let Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment } =
+            integrator.ends();
         *self = Self {
             tip_position: position,
             tip_orientation: so3::quaternion(&rotation),
@@ -944,9 +1224,12 @@ impl Outputs {
             tip_angular_velocity: angular_velocity,
             base_reaction_force: force,
             base_reaction_moment: moment,
+            tip_reaction_force: tip_force,
+            tip_reaction_moment: tip_moment,
             energy: *integrator.energy(),
             power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
-            power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
+            power_tip: (inputs.tip_force - tip_force).dot(&velocity)
+                + (inputs.tip_moment - tip_moment).dot(&angular_velocity),
             base_acceleration: base.acceleration,
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
@@ -961,17 +1244,23 @@ impl Outputs {
 }
 
 impl Acting {
-    /// The same as functions of the time since the beginning of the step, on a base that follows `segment`.
-    fn along<'a>(&'a self, segment: &'a Segment) -> impl Fn(f64) -> Drive + 'a {
+    /// The same as functions of the time since the beginning of the step, on ends that follow these segments.
+    fn along<'a>(&'a self, Segments { base, tip }: &'a Segments) -> impl Fn(f64) -> Drive + 'a {
         move |time| {
-            let (jerk, angular_acceleration) = segment.rates(time);
+            let (jerk, angular_acceleration) = base.rates(time);
             let rates = Rates { jerk, angular_acceleration, ..Rates::default() };
-            Drive { boundary: self.on(segment.at(time)), rates }
+            Drive { boundary: self.on(base.at(time), tip.as_ref().map(|tip| tip.at(time))), rates }
         }
     }
 
-    fn on(&self, base: Support) -> Boundary {
+    /// The same at the beginning of these paths.
+    fn at(&self, Paths { base, tip }: &Paths) -> Boundary {
+        self.on(*base.base(), tip.as_ref().map(|tip| *tip.base()))
+    }
+
+    fn on(&self, base: Support, tip: Option<Support>) -> Boundary {
         Boundary {
+            tip: tip.unwrap_or(Support::free()),
             tip_force: self.inputs.tip_force,
             tip_moment: self.inputs.tip_moment,
             ..Boundary::hanging_from(base, self.tunable.gravity)
@@ -990,9 +1279,8 @@ impl Response<'_> {
 
     /// Whether it would be all in a plane, had this acted.
     pub fn stays_in_plane(&self, acting: &Acting) -> bool {
-        self.course.as_ref().is_some_and(|(course, Last { path, duration, .. })| {
-            let segment = path.segment(&acting.inputs.sample(), *duration);
-            course.stays_in_plane(&acting.along(&segment))
+        self.course.as_ref().is_some_and(|(course, Last { paths, duration, .. })| {
+            course.stays_in_plane(&acting.along(&paths.segments(&acting.inputs, *duration)))
         })
     }
 
@@ -1004,25 +1292,26 @@ impl Response<'_> {
     pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
         let Unit { start, outputs, .. } = self.unit;
         let damping = acting.tunable.damped(start.parameters.rod());
-        let (mut rod, path) = match &self.course {
-            Some((course, Last { path, duration, acting: held })) => {
-                let segment = path.segment(&acting.inputs.sample(), *duration);
+        let (mut rod, paths) = match &self.course {
+            Some((course, Last { paths, duration, acting: held })) => {
+                let segments = paths.segments(&acting.inputs, *duration);
                 let other = (acting.tunable != held.tunable).then_some(&damping);
-                let rod = course.under(&acting.along(&segment), other, in_plane);
-                (rod.map_err(|failed| self.unit.failure(failed))?, segment.into_path())
+                let rod = course.under(&acting.along(&segments), other, in_plane);
+                (rod.map_err(|failed| self.unit.failure(failed, &segments))?, segments.into_paths())
             }
             None => {
-                let path = start.path(&acting.inputs);
+                let paths = start.paths(&acting.inputs);
                 let Parameters { start_in_equilibrium, quasi_static, .. } = start.parameters;
                 let mut begin = self.unit.integrator.clone();
                 begin.take_damping(&damping);
-                let rod = begin.restarted(&acting.on(*path.base()), start_in_equilibrium || quasi_static);
-                (rod.map_err(Error::NoStart)?, path)
+                let time = start.parameters.time(&damping);
+                let rod = begin.restarted(&acting.at(&paths), start_in_equilibrium || quasi_static, time);
+                (rod.map_err(Error::NoStart)?, paths)
             }
         };
         let mut outputs = outputs.clone();
         let Outputs { solver, cells, .. } = outputs;
-        outputs.read(&mut rod, path.base(), &acting.inputs, start.parameters.wants_masses());
+        outputs.read(&mut rod, paths.base.base(), &acting.inputs, start.parameters.wants_masses());
         Ok(Outputs { solver, cells, ..outputs })
     }
 
@@ -1038,7 +1327,9 @@ impl Response<'_> {
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, tunable, path, warned, outputs } but { start, step, quasi_static, last });
+archived!(Unit { integrator, tunable, path, tip_path, driven, warned, outputs } but {
+    start, step, steps_equally, longest_cell, quasi_static, last
+});
 
 /// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
 /// for bit as the one that was saved.

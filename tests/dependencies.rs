@@ -29,6 +29,7 @@ fn other(name: &str, unit: &str, kind: Kind, value: f64) -> f64 {
     match kind {
         Kind::Boolean => 1.0 - value,
         Kind::Integer if name == "cells" => value + 1.0,
+        Kind::Integer if name == "tip.mode" => 1.0 - value,
         Kind::Integer => {
             if value == 1.0 {
                 2.0
@@ -63,7 +64,15 @@ fn initial_outputs_depend_on_nothing_that_is_not_declared() {
         ("tip.force[2]", 0.01),
         ("tip.mass", 0.01),
     ];
-    for scene in [still, moving] {
+    let driven: &[(&str, f64)] = &[
+        ("cells", 4.0),
+        ("stages", 2.0),
+        ("tip.mode", 1.0),
+        ("tip.mass", 0.01),
+        ("tip.driven_velocity[2]", 0.2),
+        ("tip.driven_angular_velocity[3]", 0.4),
+    ];
+    for scene in [still, moving, driven] {
         let initialized = |changed: Option<usize>| {
             let slave = fmu.instantiate("rod", false).unwrap();
             slave.enter_initialization_mode().unwrap();

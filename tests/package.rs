@@ -171,13 +171,13 @@ fn ports_and_terminals_name_variables_with_their_units() {
         variables::all().into_iter().map(|variable| (variable.to_string(), variable)).collect();
     let members: Vec<_> = elements(&terminals::terminals());
     let members: Vec<_> = members.iter().filter(|(name, _)| name == "TerminalMemberVariable").collect();
-    assert_eq!(members.len(), 2 * 19);
+    assert_eq!(members.len(), 3 * 19);
     for (_, attributes) in members {
         assert!(known.contains_key(&attributes["variableName"]), "{attributes:?}");
     }
     let elements = elements(&terminals::ports());
     let references: Vec<_> = elements.iter().filter(|(name, _)| name == "Variable").collect();
-    assert_eq!(references.len(), 2 * 19);
+    assert_eq!(references.len(), 3 * 19);
     for (_, attributes) in references {
         let unit = attributes.get("unit").map_or("", String::as_str);
         assert_eq!(known[&attributes["ref"]].row.unit, unit);

@@ -49,6 +49,12 @@ const SCENES: &[Scene] = &[
     },
     Scene { name: "pose", integers: &[("cells", 4), ("base.motion", 1)], ..FIXED },
     Scene { name: "extensible", booleans: &["extensible"], ..FIXED },
+    Scene {
+        name: "driven",
+        integers: &[("cells", 4), ("tip.mode", 1)],
+        inputs: |t| vec![("tip.driven_velocity[2]", 0.2 * t), ("tip.driven_position[2]", 0.1 * t * t)],
+        ..FIXED
+    },
     Scene { name: "quasi-static", reals: &[("damping.drag", 0.01)], booleans: &["quasi_static"], ..FIXED },
 ];
 

@@ -243,7 +243,7 @@ pub(crate) fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static 
         Slot::Parameter(..) | Slot::IntegerParameter(..) | Slot::BooleanParameter(_) => {
             ("parameter", "fixed", Some("exact"))
         }
-        Slot::Tunable(..) => ("parameter", "tunable", Some("exact")),
+        Slot::Tunable(..) | Slot::TunableInteger(_) => ("parameter", "tunable", Some("exact")),
         Slot::Input(_) => ("input", "continuous", None),
         Slot::Output(..) => ("output", "continuous", Some("calculated")),
         Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => ("output", "discrete", Some("calculated")),

@@ -42,6 +42,8 @@ pub enum Slot {
     Tunable(fn(&mut Parameters, usize) -> &mut f64),
     /// Fixed after initialisation.
     IntegerParameter(fn(&mut Parameters) -> &mut i32),
+    /// May be set at communication points as well, from where the next step sees it.
+    TunableInteger(fn(&mut Parameters) -> &mut i32),
     /// Fixed after initialisation.
     BooleanParameter(fn(&mut Parameters) -> &mut bool),
     /// Acts in the step that follows.
@@ -138,7 +140,7 @@ impl Variable {
     pub fn kind(&self) -> Kind {
         match self.row.slot {
             Slot::Parameter(_) | Slot::Tunable(_) | Slot::Input(_) | Slot::Output(..) => Kind::Real,
-            Slot::IntegerParameter(_) | Slot::IntegerOutput(..) => Kind::Integer,
+            Slot::IntegerParameter(_) | Slot::TunableInteger(_) | Slot::IntegerOutput(..) => Kind::Integer,
             Slot::BooleanParameter(_) | Slot::BooleanOutput(..) => Kind::Boolean,
         }
     }
@@ -150,13 +152,15 @@ impl Variable {
 
     /// Whether it may be set at communication points.
     pub fn is_settable_while_stepping(&self) -> bool {
-        matches!(self.row.slot, Slot::Input(_) | Slot::Tunable(_))
+        matches!(self.row.slot, Slot::Input(_) | Slot::Tunable(_) | Slot::TunableInteger(_))
     }
 
     /// What it may be set to.
     pub fn allowed(&self) -> Allowed {
         match self.row.slot {
-            Slot::Parameter(_) | Slot::Tunable(_) | Slot::IntegerParameter(_) => Parameters::allowed(&self.to_string()),
+            Slot::Parameter(_) | Slot::Tunable(_) | Slot::IntegerParameter(_) | Slot::TunableInteger(_) => {
+                Parameters::allowed(&self.to_string())
+            }
             Slot::BooleanParameter(_) => Allowed::Choice(0, 1),
             Slot::Input(_) | Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => Allowed::Finite,
         }
@@ -184,7 +188,7 @@ impl Variable {
     pub fn given(&self, parameters: &mut Parameters, inputs: &mut Inputs) -> Option<f64> {
         match self.row.slot {
             Slot::Parameter(at) | Slot::Tunable(at) => Some(*at(parameters, self.element)),
-            Slot::IntegerParameter(at) => Some((*at(parameters)).into()),
+            Slot::IntegerParameter(at) | Slot::TunableInteger(at) => Some((*at(parameters)).into()),
             Slot::BooleanParameter(at) => Some(u8::from(*at(parameters)).into()),
             Slot::Input(at) => Some(*at(inputs, self.element)),
             Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => None,
@@ -206,7 +210,7 @@ impl Variable {
         match self.row.slot {
             Slot::Parameter(at) | Slot::Tunable(at) => *at(parameters, self.element) = value,
             // Exact: the value came from an i32, or is 0 or 1.
-            Slot::IntegerParameter(at) => *at(parameters) = value as i32,
+            Slot::IntegerParameter(at) | Slot::TunableInteger(at) => *at(parameters) = value as i32,
             Slot::BooleanParameter(at) => *at(parameters) = value != 0.0,
             Slot::Input(at) => *at(inputs, self.element) = value,
             Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => {}
@@ -245,19 +249,24 @@ const SHAPE: Initially = Initially::AllBut(&[
     "damping.drag",
     "tip.inertia",
     "base.motion",
+    "tip.motion",
     "step",
     "spectral_radius",
     "planar",
     "effective_mass",
     "base.velocity",
     "base.angular_velocity",
+    "tip.driven_velocity",
+    "tip.driven_angular_velocity",
 ]);
 /// Damping and the start in motion reach the accelerations, and these the reaction; only the time steps do not.
 const START: Initially = Initially::AllBut(&["step", "spectral_radius", "planar", "effective_mass"]);
 /// The same where it is wanted at all.
 const MASS: Initially = Initially::AllBut(&["step", "spectral_radius", "planar"]);
 
-use Slot::{BooleanOutput, BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable};
+use Slot::{
+    BooleanOutput, BooleanParameter, Input, IntegerOutput, IntegerParameter, Output, Parameter, Tunable, TunableInteger,
+};
 
 /// The table.
 #[rustfmt::skip]
@@ -299,6 +308,10 @@ pub static ROWS: &[Row] = &[
         "Whether the section shears and stretches"),
     scalar("base.motion", "", IntegerParameter(|p| &mut p.base_motion),
         "Which inputs move the base: 0 pose and twist, 1 pose only (twist derived), 2 twist only (pose integrated from the initial one)"),
+    scalar("tip.mode", "", TunableInteger(|p| &mut p.tip_mode),
+        "What holds the tip: 0 nothing, it is loaded by tip.force and tip.moment; 1 it follows tip.driven_position and so on, and the loads act on it besides. From 0 to 1 it begins with the motion it has and is led to these inputs; from 1 to 0 it is let go. A run that starts with 1 starts from the static equilibrium between the ends"),
+    scalar("tip.motion", "", IntegerParameter(|p| &mut p.tip_motion),
+        "Which inputs move a driven tip: 0 pose and twist, 1 pose only (twist derived), 2 twist only (pose integrated from the one it begins with)"),
     scalar("cells", "", IntegerParameter(|p| &mut p.cells),
         "Cells along the rod; 0 = chosen by the unit"),
     scalar("stages", "", IntegerParameter(|p| &mut p.stages),
@@ -310,7 +323,7 @@ pub static ROWS: &[Row] = &[
     scalar("spectral_radius", "", Parameter(|p, _| &mut p.spectral_radius),
         "Spectral radius of the time integrator at infinite frequency: 0 damps most, 1 nothing"),
     scalar("start_in_equilibrium", "", BooleanParameter(|p| &mut p.start_in_equilibrium),
-        "Whether the run starts from the static equilibrium under gravity and the initial inputs instead of the rest shape"),
+        "Whether the run starts from the static equilibrium under gravity and the initial inputs instead of the rest shape; it does so in any case with a driven tip"),
     scalar("planar", "", BooleanParameter(|p| &mut p.planar),
         "Whether the rod may be computed in a plane as long as it lies and moves in one, and all that acts on it leaves it there"),
     scalar("quasi_static", "", BooleanParameter(|p| &mut p.quasi_static),
@@ -330,6 +343,14 @@ pub static ROWS: &[Row] = &[
         "Force exerted on the tip of the rod by its surroundings, world frame"),
     array("tip.moment", "N.m", XYZ, Input(|i, k| &mut i.tip_moment[k]),
         "Moment exerted on the tip of the rod by its surroundings, about the tip point, world frame"),
+    array("tip.driven_position", "m", XYZ, Input(|i, k| &mut i.tip_position[k]),
+        "Position of a driven tip (tip.mode = 1), world frame"),
+    array("tip.driven_orientation", "", WXYZ, Input(|i, k| &mut i.tip_orientation[k]),
+        "Orientation of a driven tip, quaternion from body to world frame, normalised on use; the tangent there, d3, points away from the rod"),
+    array("tip.driven_velocity", "m/s", XYZ, Input(|i, k| &mut i.tip_velocity[k]),
+        "Velocity of a driven tip, world frame"),
+    array("tip.driven_angular_velocity", "rad/s", XYZ, Input(|i, k| &mut i.tip_angular_velocity[k]),
+        "Angular velocity of a driven tip, world frame"),
 
     array("tip.position", "m", XYZ, Output(|o, k| o.tip_position[k], SHAPE),
         "Position of the tip point, world frame"),
@@ -343,6 +364,10 @@ pub static ROWS: &[Row] = &[
         "Force the rod exerts on its base, world frame; add it to the forces on the base"),
     array("base.reaction_moment", "N.m", XYZ, Output(|o, k| o.base_reaction_moment[k], START),
         "Moment the rod exerts on its base, about the base point, world frame; add it to the moments on the base"),
+    array("tip.reaction_force", "N", XYZ, Output(|o, k| o.tip_reaction_force[k], START),
+        "Force the rod, with the body and the load at its tip, exerts on what drives the tip, world frame; add it to the forces there. Zero while tip.mode = 0"),
+    array("tip.reaction_moment", "N.m", XYZ, Output(|o, k| o.tip_reaction_moment[k], START),
+        "Moment the rod, with the body and the load at its tip, exerts on what drives the tip, about the tip point, world frame; add it to the moments there. Zero while tip.mode = 0"),
     Row { name: "station[i].position", unit: "m", components: XYZ, copies: STATIONS,
         slot: Output(|o, k| o.stations[k / 3][k % 3], SHAPE),
         description: "Position of the centreline at equal arc lengths from the base (first) to the tip (last), world frame" },
@@ -357,11 +382,11 @@ pub static ROWS: &[Row] = &[
     scalar("energy.work_base", "J", Output(|o, _| o.energy.work_base, Initially::Constant),
         "Work the base has done on the rod since the start"),
     scalar("energy.work_tip", "J", Output(|o, _| o.energy.work_tip, Initially::Constant),
-        "Work the tip force and moment have done on the rod since the start"),
+        "Work the tip force and moment, and what drives the tip, have done on the rod since the start"),
     scalar("coupling.power_base", "W", Output(|o, _| o.power_base, START),
         "Power that the base puts into the rod, the rate of energy.work_base"),
     scalar("coupling.power_tip", "W", Output(|o, _| o.power_tip, START),
-        "Power that the tip force and moment of the step that ends here put into the rod, the rate of energy.work_tip"),
+        "Power that the tip force and moment of the step that ends here, and what drives the tip, put into the rod, the rate of energy.work_tip"),
     array("coupling.base_acceleration", "m/s2", XYZ, Output(|o, k| o.base_acceleration[k], Initially::Constant),
         "Acceleration of the base point on its path at the end of the step, world frame"),
     array("coupling.effective_mass", "kg", MATRIX, Output(|o, k| o.effective_mass[(k / 3, k % 3)], MASS),

@@ -1,7 +1,8 @@
-//! The two ends of the rod as ports, for those who connect units by ports instead of by variables.
+//! The two ends of the rod as ports, the tip as a loaded and as a driven one, for those who connect units by ports instead of by variables.
 //!
 //! Both terminals have members of the same names: the tip of one rod fits the base of another. Motion goes from tip to
-//! base; the load goes the other way, as the reaction of the one is the tip load of the other, with the same sign.
+//! base; the load goes the other way, as the reaction of the one is the tip load of the other, with the same sign. A
+//! driven tip is as a base.
 
 use crate::fmi2::description::{Xml, document};
 use crate::fmi2::variables::{self, Variable};
@@ -28,7 +29,7 @@ struct End {
 
 const MEMBERS: [&str; 6] = ["position", "orientation", "velocity", "angular_velocity", "force", "moment"];
 
-const ENDS: [End; 2] = [
+const ENDS: [End; 3] = [
     End {
         name: "base",
         description: "Clamped end: pose and twist in, force and moment on the base out; world frame, about the base point",
@@ -47,6 +48,19 @@ const ENDS: [End; 2] = [
         description: "Far end: pose and twist out, force and moment on the tip in; world frame, about the tip point",
         rows: ["tip.position", "tip.orientation", "tip.velocity", "tip.angular_velocity", "tip.force", "tip.moment"],
         load: "inflow",
+    },
+    End {
+        name: "driven_tip",
+        description: "Far end with tip.mode = 1: pose and twist in, force and moment on what drives the tip out; world frame, about the tip point",
+        rows: [
+            "tip.driven_position",
+            "tip.driven_orientation",
+            "tip.driven_velocity",
+            "tip.driven_angular_velocity",
+            "tip.reaction_force",
+            "tip.reaction_moment",
+        ],
+        load: "outflow",
     },
 ];
 
@@ -157,10 +171,13 @@ mod tests {
             let sizes = end.rows.map(|row| elements(row).len());
             assert_eq!(sizes, [3, 4, 3, 3, 3, 3], "{}", end.name);
         }
-        // what one end gives, the other takes
-        for (base, tip) in ENDS[0].rows.iter().zip(ENDS[1].rows) {
-            for (base, tip) in elements(base).iter().zip(elements(tip)) {
-                assert!(base.is_output() != tip.is_output() && base.row.unit == tip.row.unit, "{base}, {tip}");
+        // what a tip gives, a base or a driven tip takes
+        let [base, tip, driven] = &ENDS;
+        for end in [base, driven] {
+            for (end, tip) in end.rows.iter().zip(tip.rows) {
+                for (end, tip) in elements(end).iter().zip(elements(tip)) {
+                    assert!(end.is_output() != tip.is_output() && end.row.unit == tip.row.unit, "{end}, {tip}");
+                }
             }
         }
     }

@@ -16,6 +16,7 @@ pub fn inputs(boundary: &Boundary) -> Inputs {
         base_angular_velocity: base.angular_velocity,
         tip_force: boundary.tip_force,
         tip_moment: boundary.tip_moment,
+        ..Inputs::default()
     }
 }
 

@@ -269,3 +269,27 @@ def test_a_foreign_guid_gives_no_instance(unpacked, description):
     )
     with pytest.raises(Exception, match="instantiate"):
         slave.instantiate()
+
+
+def test_a_tip_is_driven_caught_and_let_go(instance, reference):
+    tip, position = array(reference, "tip.reaction_force"), array(reference, "tip.position")
+    instance.setInteger([reference["tip.mode"]], [1])
+    initialize(instance)
+    weight = 1100 * math.pi * 0.005**2 * 9.81
+    # between two ends at one height each carries half
+    assert instance.getReal(tip)[2] == pytest.approx(-0.5 * weight, rel=1e-6)
+    assert instance.getReal(position) == pytest.approx([0.5, 0, 0], abs=1e-9)
+    driven = array(reference, "tip.driven_position") + array(reference, "tip.driven_velocity")
+    for k in range(60):
+        time = k * STEP
+        mode = 0 if 20 <= k < 40 else 1
+        instance.setInteger([reference["tip.mode"]], [mode])
+        if k == 40:
+            instance.setReal(driven, instance.getReal(position) + [0.0, 0.0, 0.0])
+        before = instance.getReal(position)
+        instance.doStep(currentCommunicationPoint=time, communicationStepSize=STEP)
+        assert math.dist(instance.getReal(position), before) < 0.1
+        assert any(instance.getReal(tip)) == (mode == 1)
+    with pytest.raises(FMICallException):
+        instance.setInteger([reference["tip.mode"]], [2])
+    instance.terminate()
