@@ -865,16 +865,16 @@ impl Plane {
         mut load: Triple,
     ) {
         let Self { rule, section, method, cells, now, increments, starts, stages, .. } = self;
-        let mut sums = Sums::at_base(ends, section, p_0, q_0);
+        let mut sums = Sums::at_base(rule, section, ends, [w, p_0, q_0]);
         let increments = increments.chunks_exact_mut(method.stages);
         for ((((stage, start), now), cell), increments) in
             stages.iter_mut().zip(&*starts).zip(&*now).zip(&*cells).zip(increments)
         {
             increments[i - 1] = stage.increment::<K>(rule, start, w, &mut node);
             stage.combine(start, now, &increments[..i], method.a[i], method.c[i], per_step);
-            sums.pass::<K>(rule, section, cell, start, now, stage, w);
+            sums.pass::<K>(cell, start, now, stage);
         }
-        let mut loads = sums.at_tip(ends, section);
+        let mut loads = sums.at_tip(ends);
         for (j, ((stage, start), cell)) in stages.iter_mut().zip(&*starts).zip(&*cells).enumerate().rev() {
             loads.pass::<K>(rule, cell, start, stage);
             stage.carry::<K>(start, &mut load, j > 0);
@@ -966,11 +966,11 @@ impl Plane {
     /// −G of the stage, and G_ν p + G_β q̃, of all cells; p₀ and q̃₀ are those of the base.
     fn residuals<const K: usize>(&mut self, ends: &Ends, w: f64, p_0: f64, q_0: f64) {
         let Self { rule, section, cells, stages, starts, now, .. } = self;
-        let mut sums = Sums::at_base(ends, section, p_0, q_0);
+        let mut sums = Sums::at_base(rule, section, ends, [w, p_0, q_0]);
         for (((stage, start), now), cell) in stages.iter_mut().zip(&*starts).zip(&*now).zip(&*cells) {
-            sums.pass::<K>(rule, section, cell, start, now, stage, w);
+            sums.pass::<K>(cell, start, now, stage);
         }
-        let mut loads = sums.at_tip(ends, section);
+        let mut loads = sums.at_tip(ends);
         for ((stage, start), cell) in stages.iter_mut().zip(&*starts).zip(&*cells).rev() {
             loads.pass::<K>(rule, cell, start, stage);
         }
@@ -1133,7 +1133,10 @@ impl Stage {
 }
 
 /// What adds up from the base on.
-struct Sums {
+struct Sums<'a> {
+    rule: &'a Rule,
+    section: &'a Section,
+    w: f64,
     /// a, and of the terms in p and q.
     acceleration: [f64; 2],
     source: [f64; 2],
@@ -1143,9 +1146,12 @@ struct Sums {
     velocity: [f64; 2],
 }
 
-impl Sums {
-    fn at_base(ends: &Ends, section: &Section, p_0: f64, q_0: f64) -> Self {
+impl<'a> Sums<'a> {
+    fn at_base(rule: &'a Rule, section: &'a Section, ends: &Ends, [w, p_0, q_0]: [f64; 3]) -> Self {
         Self {
+            rule,
+            section,
+            w,
             acceleration: ends.acceleration,
             source: [0.0; 2],
             bent: ends.angle + section.damping * (ends.rate - p_0),
@@ -1156,19 +1162,10 @@ impl Sums {
 
     /// From node to node of a cell.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    fn pass<const K: usize>(
-        &mut self,
-        rule: &Rule,
-        section: &Section,
-        cell: &Cell,
-        start: &Start,
-        now: &Points,
-        stage: &mut Stage,
-        w: f64,
-    ) {
-        let Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia } = *section;
-        let Self { acceleration: a, source, bent, turning, velocity: u } = self;
+    fn pass<const K: usize>(&mut self, cell: &Cell, start: &Start, now: &Points, stage: &mut Stage) {
+        let Self { rule, section, w, acceleration: a, source, bent, turning, velocity: u } = self;
+        let Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia } = **section;
+        let w = *w;
         let Cell { length: h, rest } = *cell;
         let [turn, omega, beta] = &stage.points;
         let (cos, sin, p, q) = (&stage.cos, &stage.sin, &stage.p, &stage.q);
@@ -1213,9 +1210,9 @@ impl Sums {
         }
     }
 
-    fn at_tip(self, ends: &Ends, section: &Section) -> Loads {
+    fn at_tip(self, ends: &Ends) -> Loads {
+        let Self { section, acceleration: a, source, turning, velocity: u, .. } = self;
         let Section { drag, tip_mass, tip_inertia, .. } = *section;
-        let Self { acceleration: a, source, turning, velocity: u, .. } = self;
         Loads {
             force: from_fn(|i| ends.force[i] - tip_mass * (a[i] - drag * u[i])),
             source: source.map(|a| -tip_mass * a),
