@@ -146,6 +146,9 @@ impl Powers {
 fn losses(mesh: &Mesh, rod: &Rod, state: &State) -> f64 {
     let stages = mesh.rule.stages;
     let viscosity = rod.stiffness.component_mul(&rod.damping);
+    if viscosity == Vector3::zeros() && rod.drag == 0.0 {
+        return 0.0;
+    }
     let at = |i: usize| {
         let memory = &state.memory[i];
         let (strain, u) = (memory.strain.velocity.value, memory.travel.velocity.value);

@@ -440,7 +440,7 @@ pub struct Plane {
     now: Vec<Points>,
     before: Vec<Points>,
     next: Vec<Points>,
-    /// Stage by stage, cell by cell.
+    /// Cell by cell, stage by stage.
     increments: Vec<Points>,
     starts: Vec<Start>,
     stages: Vec<Stage>,
@@ -796,7 +796,7 @@ impl Plane {
 
     fn start_by<const K: usize>(&mut self, drive: &Drive) -> Result<(), Singular> {
         let ends = self.ends_of(drive, &self.ends);
-        self.begin();
+        self.begin::<K>();
         for stage in &mut self.stages {
             (stage.points[2], stage.p, stage.q) = Default::default();
         }
@@ -828,54 +828,77 @@ impl Plane {
     fn attempt_by<const K: usize>(&mut self, drive: &impl Fn(f64) -> Drive, h: f64) -> Result<Estimate, Singular> {
         let method = self.method;
         let w = 1.0 / (method.gamma * h);
-        let count = self.cells.len();
         let mut at_stage = drive(0.0);
         let mut ends = self.ends_of(&at_stage, &self.ends);
         let rates = self.rates_of(&at_stage, drive, h);
         let (rate, turning) = (ends.rate, ends.turning);
         let body_drag = self.section.tip_mass * self.section.drag;
         let a_b = self.frame.part(&at_stage.boundary.base.acceleration);
-        self.begin();
+        let mut node = [0.0; 3];
+        self.begin::<K>();
         for i in 0..method.stages {
-            if i > 0 {
-                if method.nodes[i] != method.nodes[i - 1] {
-                    at_stage = drive(method.nodes[i] * h);
-                    ends = self.ends_of(&at_stage, &ends);
-                }
-                self.combine(method.a[i], method.c[i], 1.0 / h);
+            if i > 0 && method.nodes[i] != method.nodes[i - 1] {
+                at_stage = drive(method.nodes[i] * h);
+                ends = self.ends_of(&at_stage, &ends);
             }
             let time = h * method.rates[i];
             let p_0 = time * (w * rate - turning);
             let q_0 = time * (w * w * rate - rates.turning);
-            self.residuals::<K>(&ends, w, p_0, q_0);
-            if i == 0 {
-                self.factorise::<K>([1.0, w, w * w])?;
-            }
-            self.carry::<K>([
+            let load = [
                 time * (rates.force[0] + body_drag * a_b[0]),
                 time * (rates.force[1] + body_drag * a_b[1]),
                 time * rates.moment,
-            ]);
-            let mut node = [time * rates.acceleration[0], time * rates.acceleration[1], time * rate];
-            let increments = &mut self.increments[i * count..][..count];
-            for ((increment, start), stage) in increments.iter_mut().zip(&self.starts).zip(&self.stages) {
-                let x = follow::<K>(&self.rule, start, &stage.u, &mut node);
-                let v = lane(|k| w * x[k] - stage.p[k]);
-                *increment = [x, v, lane(|k| w * v[k] - stage.q[k])];
+            ];
+            if i == 0 {
+                self.residuals::<K>(&ends, w, p_0, q_0);
+                self.factorise::<K>([1.0, w, w * w])?;
+                self.carry::<K>(load);
+            } else {
+                self.next_stage::<K>(i, node, 1.0 / h, &ends, [w, p_0, q_0], load);
             }
+            node = [time * rates.acceleration[0], time * rates.acceleration[1], time * rate];
         }
         (self.next_ends, self.next_drive) = (ends, at_stage);
-        Ok(self.finish(h))
+        Ok(self.finish::<K>(h, w, node))
+    }
+
+    /// Ends stage `i` − 1, for which the base moves by `node`, and takes stage `i` as far, `load` being what its loads
+    /// change by: once to the tip and once back, as of many cells the memory costs more than what is done.
+    fn next_stage<const K: usize>(
+        &mut self,
+        i: usize,
+        mut node: Triple,
+        per_step: f64,
+        ends: &Ends,
+        [w, p_0, q_0]: [f64; 3],
+        mut load: Triple,
+    ) {
+        let Self { rule, section, method, cells, now, increments, starts, stages, .. } = self;
+        let mut sums = Sums::at_base(rule, section, ends, [w, p_0, q_0]);
+        let increments = increments.chunks_exact_mut(method.stages);
+        for ((((stage, start), now), cell), increments) in
+            stages.iter_mut().zip(&*starts).zip(&*now).zip(&*cells).zip(increments)
+        {
+            increments[i - 1] = stage.increment::<K>(rule, start, w, &mut node);
+            stage.combine(start, now, &increments[..i], method.a[i], method.c[i], per_step);
+            sums.pass::<K>(cell, start, now, stage);
+        }
+        let mut loads = sums.at_tip(ends);
+        for (j, ((stage, start), cell)) in stages.iter_mut().zip(&*starts).zip(&*cells).enumerate().rev() {
+            loads.pass::<K>(rule, cell, start, stage);
+            stage.carry::<K>(start, &mut load, j > 0);
+        }
     }
 
     /// The last stage is the error, and the rest of the step.
-    fn finish(&mut self, h: f64) -> Estimate {
-        let count = self.cells.len();
-        let last = &self.increments[(self.method.stages - 1) * count..];
+    fn finish<const K: usize>(&mut self, h: f64, w: f64, mut node: Triple) -> Estimate {
         let (mut way, mut speed) = ([0.0; 2], [0.0; 2]);
         let mut most = [0.0; 2];
+        let last = self.method.stages - 1;
         for (j, cell) in self.cells.iter().enumerate() {
-            let (stage, start, increment, now) = (&self.stages[j], &self.starts[j], &last[j], &self.now[j]);
+            let (stage, start, now) = (&self.stages[j], &self.starts[j], &self.now[j]);
+            let increment = stage.increment::<K>(&self.rule, start, w, &mut node);
+            self.increments[j * self.method.stages + last] = increment;
             let next = &mut self.next[j];
             for k in 0..MAX_STAGES {
                 next[0][k] = now[0][k] + (stage.points[0][k] + increment[0][k]);
@@ -937,9 +960,9 @@ impl Plane {
     }
 
     /// Where the step begins is where its first stage stands.
-    fn begin(&mut self) {
+    fn begin<const K: usize>(&mut self) {
         for ((start, stage), points) in self.starts.iter_mut().zip(&mut self.stages).zip(&self.now) {
-            for k in 0..self.mesh.rule.stages {
+            for k in 0..K {
                 (start.sin[k], start.cos[k]) = points[0][k].sin_cos();
             }
             start.omega = points[1];
@@ -949,108 +972,16 @@ impl Plane {
         }
     }
 
-    /// Puts the sums Σ a U and Σ C U / h of the stages so far where the next one begins.
-    #[inline(always)]
-    fn combine(&mut self, a: &[f64], c: &[f64], per_step: f64) {
-        let count = self.cells.len();
-        for (j, (stage, start)) in self.stages.iter_mut().zip(&self.starts).enumerate() {
-            let mut points = [Lane::default(), self.now[j][1], self.now[j][2]];
-            let (mut p, mut q) = (Lane::default(), Lane::default());
-            for (i, (a, c)) in a.iter().zip(c).enumerate() {
-                let [x, v, acceleration] = &self.increments[i * count + j];
-                let c = c * per_step;
-                add_scaled(&mut points[0], *a, x);
-                add_scaled(&mut points[1], *a, v);
-                add_scaled(&mut points[2], *a, acceleration);
-                add_scaled(&mut p, c, x);
-                add_scaled(&mut q, c, v);
-            }
-            stage.p = lane(|k| p[k] + points[1][k]);
-            stage.q = lane(|k| q[k] + points[2][k]);
-            let turn = &points[0];
-            let (sin, cos) = match turn.iter().all(|x| x.abs() <= SMALL_TURN) {
-                true => sin_cos_of_small(turn),
-                false => (turn.map(f64::sin), turn.map(f64::cos)),
-            };
-            stage.cos = lane(|k| start.cos[k] * cos[k] - start.sin[k] * sin[k]);
-            stage.sin = lane(|k| start.sin[k] * cos[k] + start.cos[k] * sin[k]);
-            stage.points = points;
-        }
-    }
-
     /// −G of the stage, and G_ν p + G_β q̃, of all cells; p₀ and q̃₀ are those of the base.
-    #[inline(always)]
     fn residuals<const K: usize>(&mut self, ends: &Ends, w: f64, p_0: f64, q_0: f64) {
-        let Self { rule, cells, stages, starts, now, .. } = self;
-        let Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia } = self.section;
-        let (mut a, mut source) = (ends.acceleration, [0.0; 2]);
-        let mut bent = ends.angle + damping * (ends.rate - p_0);
-        let mut turning = ends.turning - q_0;
-        let mut u = ends.velocity;
-        for (j, stage) in stages.iter_mut().enumerate() {
-            let (Cell { length: h, rest }, start) = (cells[j], &starts[j]);
-            let [turn, omega, beta] = &stage.points;
-            let (cos, sin, p, q) = (&stage.cos, &stage.sin, &stage.p, &stage.q);
-
-            let square = omega.map(|omega| omega * omega);
-            let push = lane(|k| beta[k] + drag * omega[k]);
-            let a_s =
-                [lane(|k| -(square[k] * cos[k] + push[k] * sin[k])), lane(|k| push[k] * cos[k] - square[k] * sin[k])];
-            let push = lane(|k| q[k] + (w + drag) * p[k]);
-            let pull = lane(|k| 2.0 * start.omega[k] * p[k]);
-            let source_s = [
-                lane(|k| -(pull[k] * start.cos[k] + push[k] * start.sin[k])),
-                lane(|k| push[k] * start.cos[k] - pull[k] * start.sin[k]),
-            ];
-            let per_w = -(h * mass);
-            let per_slope = per_w * h;
-            for i in 0..2 {
-                let base = per_w * a[i];
-                let inner = spread::<K>(&rule.twice_columns, &a_s[i]);
-                stage.n[i] = lane(|k| base * rule.rest[k] + per_slope * inner[k]);
-                stage.n_0[i] = base + per_slope * total(&rule.twice_0, &a_s[i]);
-                a[i] += h * total(&rule.b, &a_s[i]);
-                let base = per_w * source[i];
-                let inner = spread::<K>(&rule.twice_columns, &source_s[i]);
-                stage.source[i] = lane(|k| base * rule.rest[k] + per_slope * inner[k]);
-                stage.source_0[i] = base + per_slope * total(&rule.twice_0, &source_s[i]);
-                source[i] += h * total(&rule.b, &source_s[i]);
-            }
-
-            let beyond = lane(|k| beta[k] - (w * p[k] + q[k]));
-            stage.spin = beyond.map(|beta| inertia * beta);
-            let angles = lane(|k| (now[j][0][k] + turn[k]) + damping * (omega[k] - p[k]) - bent);
-            let per_turn = stiffness / h;
-            let strain = spread::<K>(&rule.slopes, &angles);
-            stage.law = lane(|k| per_turn * strain[k] - stiffness * rest);
-            bent += total(&rule.end, &angles);
-            if tip_inertia > 0.0 {
-                turning += total(&rule.end, &beyond.map(|beta| beta - turning));
-            }
-            if tip_mass * drag > 0.0 {
-                u[0] -= h * total(&rule.b, &lane(|k| omega[k] * sin[k]));
-                u[1] += h * total(&rule.b, &lane(|k| omega[k] * cos[k]));
-            }
+        let Self { rule, section, cells, stages, starts, now, .. } = self;
+        let mut sums = Sums::at_base(rule, section, ends, [w, p_0, q_0]);
+        for (((stage, start), now), cell) in stages.iter_mut().zip(&*starts).zip(&*now).zip(&*cells) {
+            sums.pass::<K>(cell, start, now, stage);
         }
-
-        let mut n: [f64; 2] = from_fn(|i| ends.force[i] - tip_mass * (a[i] - drag * u[i]));
-        let mut source = source.map(|a| -tip_mass * a);
-        let mut m = ends.moment - tip_inertia * turning;
-        for (j, stage) in stages.iter_mut().enumerate().rev() {
-            let (h, start) = (cells[j].length, &starts[j]);
-            for i in 0..2 {
-                stage.n[i] = stage.n[i].map(|x| x + n[i]);
-                stage.source[i] = stage.source[i].map(|x| x + source[i]);
-                n[i] += stage.n_0[i];
-                source[i] += stage.source_0[i];
-            }
-            let m_s = lane(|k| {
-                stage.spin[k] - (stage.cos[k] * stage.n[1][k] - stage.sin[k] * stage.n[0][k])
-                    + (start.cos[k] * stage.source[1][k] - start.sin[k] * stage.source[0][k])
-            });
-            let inner = spread::<K>(&rule.backward_columns, &m_s);
-            stage.u = lane(|k| (m - stage.law[k]) - h * inner[k]);
-            m -= h * total(&rule.b, &m_s);
+        let mut loads = sums.at_tip(ends);
+        for ((stage, start), cell) in stages.iter_mut().zip(&*starts).zip(&*cells).rev() {
+            loads.pass::<K>(rule, cell, start, stage);
         }
     }
 
@@ -1152,21 +1083,179 @@ impl Plane {
     }
 
     /// From the loads p at the tip to the base what the residuals make of Φ.
-    #[inline(always)]
     fn carry<const K: usize>(&mut self, mut p: Triple) {
         for (j, (stage, start)) in self.stages.iter_mut().zip(&self.starts).enumerate().rev() {
-            let mut u = spread::<K>(&start.by_law, &stage.u);
+            stage.carry::<K>(start, &mut p, j > 0);
+        }
+    }
+}
+
+impl Stage {
+    /// What the stage adds, from its Φ and the way of the node before the cell, which becomes that of the one behind.
+    #[inline(always)]
+    fn increment<const K: usize>(&self, rule: &Rule, start: &Start, w: f64, node: &mut Triple) -> Points {
+        let x = follow::<K>(rule, start, &self.u, node);
+        let v = lane(|k| w * x[k] - self.p[k]);
+        [x, v, lane(|k| w * v[k] - self.q[k])]
+    }
+
+    /// Puts the sums Σ a U and Σ C U / h of the stages so far where this one begins.
+    #[inline(always)]
+    fn combine(&mut self, start: &Start, now: &Points, increments: &[Points], a: &[f64], c: &[f64], per_step: f64) {
+        let mut points = [Lane::default(), now[1], now[2]];
+        let (mut p, mut q) = (Lane::default(), Lane::default());
+        for (([x, v, acceleration], a), c) in increments.iter().zip(a).zip(c) {
+            let c = c * per_step;
+            add_scaled(&mut points[0], *a, x);
+            add_scaled(&mut points[1], *a, v);
+            add_scaled(&mut points[2], *a, acceleration);
+            add_scaled(&mut p, c, x);
+            add_scaled(&mut q, c, v);
+        }
+        self.p = lane(|k| p[k] + points[1][k]);
+        self.q = lane(|k| q[k] + points[2][k]);
+        let turn = &points[0];
+        let (sin, cos) = match turn.iter().all(|x| x.abs() <= SMALL_TURN) {
+            true => sin_cos_of_small(turn),
+            false => (turn.map(f64::sin), turn.map(f64::cos)),
+        };
+        self.cos = lane(|k| start.cos[k] * cos[k] - start.sin[k] * sin[k]);
+        self.sin = lane(|k| start.sin[k] * cos[k] + start.cos[k] * sin[k]);
+        self.points = points;
+    }
+
+    /// Φ at w₀ = φ₀ = 0 from the residual of the law and the loads p, which become those of the cell before, if `on`.
+    #[inline(always)]
+    fn carry<const K: usize>(&mut self, start: &Start, p: &mut Triple, on: bool) {
+        let mut u = spread::<K>(&start.by_law, &self.u);
+        for i in 0..3 {
+            add_scaled(&mut u, p[i], &start.by_load[i]);
+        }
+        self.u = u;
+        if on {
+            p[2] += start.by_force[0] * p[0] + start.by_force[1] * p[1];
             for i in 0..3 {
-                add_scaled(&mut u, p[i], &start.by_load[i]);
-            }
-            stage.u = u;
-            if j > 0 {
-                p[2] += start.by_force[0] * p[0] + start.by_force[1] * p[1];
-                for i in 0..3 {
-                    p[i] += total(&start.carried[i], &u);
-                }
+                p[i] += total(&start.carried[i], &u);
             }
         }
+    }
+}
+
+/// What adds up from the base on.
+struct Sums<'a> {
+    rule: &'a Rule,
+    section: &'a Section,
+    w: f64,
+    /// a, and of the terms in p and q.
+    acceleration: [f64; 2],
+    source: [f64; 2],
+    /// θ + τ (ω − p), β − q̃.
+    bent: f64,
+    turning: f64,
+    velocity: [f64; 2],
+}
+
+impl<'a> Sums<'a> {
+    fn at_base(rule: &'a Rule, section: &'a Section, ends: &Ends, [w, p_0, q_0]: [f64; 3]) -> Self {
+        Self {
+            rule,
+            section,
+            w,
+            acceleration: ends.acceleration,
+            source: [0.0; 2],
+            bent: ends.angle + section.damping * (ends.rate - p_0),
+            turning: ends.turning - q_0,
+            velocity: ends.velocity,
+        }
+    }
+
+    /// From node to node of a cell.
+    #[inline(always)]
+    fn pass<const K: usize>(&mut self, cell: &Cell, start: &Start, now: &Points, stage: &mut Stage) {
+        let Self { rule, section, w, acceleration: a, source, bent, turning, velocity: u } = self;
+        let Section { stiffness, damping, mass, inertia, drag, tip_mass, tip_inertia } = **section;
+        let w = *w;
+        let Cell { length: h, rest } = *cell;
+        let [turn, omega, beta] = &stage.points;
+        let (cos, sin, p, q) = (&stage.cos, &stage.sin, &stage.p, &stage.q);
+
+        let square = omega.map(|omega| omega * omega);
+        let push = lane(|k| beta[k] + drag * omega[k]);
+        let a_s = [lane(|k| -(square[k] * cos[k] + push[k] * sin[k])), lane(|k| push[k] * cos[k] - square[k] * sin[k])];
+        let push = lane(|k| q[k] + (w + drag) * p[k]);
+        let pull = lane(|k| 2.0 * start.omega[k] * p[k]);
+        let source_s = [
+            lane(|k| -(pull[k] * start.cos[k] + push[k] * start.sin[k])),
+            lane(|k| push[k] * start.cos[k] - pull[k] * start.sin[k]),
+        ];
+        let per_w = -(h * mass);
+        let per_slope = per_w * h;
+        for i in 0..2 {
+            let base = per_w * a[i];
+            let inner = spread::<K>(&rule.twice_columns, &a_s[i]);
+            stage.n[i] = lane(|k| base * rule.rest[k] + per_slope * inner[k]);
+            stage.n_0[i] = base + per_slope * total(&rule.twice_0, &a_s[i]);
+            a[i] += h * total(&rule.b, &a_s[i]);
+            let base = per_w * source[i];
+            let inner = spread::<K>(&rule.twice_columns, &source_s[i]);
+            stage.source[i] = lane(|k| base * rule.rest[k] + per_slope * inner[k]);
+            stage.source_0[i] = base + per_slope * total(&rule.twice_0, &source_s[i]);
+            source[i] += h * total(&rule.b, &source_s[i]);
+        }
+
+        let beyond = lane(|k| beta[k] - (w * p[k] + q[k]));
+        stage.spin = beyond.map(|beta| inertia * beta);
+        let angles = lane(|k| (now[0][k] + turn[k]) + damping * (omega[k] - p[k]) - *bent);
+        let per_turn = stiffness / h;
+        let strain = spread::<K>(&rule.slopes, &angles);
+        stage.law = lane(|k| per_turn * strain[k] - stiffness * rest);
+        *bent += total(&rule.end, &angles);
+        if tip_inertia > 0.0 {
+            *turning += total(&rule.end, &beyond.map(|beta| beta - *turning));
+        }
+        if tip_mass * drag > 0.0 {
+            u[0] -= h * total(&rule.b, &lane(|k| omega[k] * sin[k]));
+            u[1] += h * total(&rule.b, &lane(|k| omega[k] * cos[k]));
+        }
+    }
+
+    fn at_tip(self, ends: &Ends) -> Loads {
+        let Self { section, acceleration: a, source, turning, velocity: u, .. } = self;
+        let Section { drag, tip_mass, tip_inertia, .. } = *section;
+        Loads {
+            force: from_fn(|i| ends.force[i] - tip_mass * (a[i] - drag * u[i])),
+            source: source.map(|a| -tip_mass * a),
+            moment: ends.moment - tip_inertia * turning,
+        }
+    }
+}
+
+/// n, its terms in p and q, and m, from the tip on.
+struct Loads {
+    force: [f64; 2],
+    source: [f64; 2],
+    moment: f64,
+}
+
+impl Loads {
+    /// From node to node of a cell, whose law gets its residual.
+    #[inline(always)]
+    fn pass<const K: usize>(&mut self, rule: &Rule, cell: &Cell, start: &Start, stage: &mut Stage) {
+        let Self { force: n, source, moment: m } = self;
+        let h = cell.length;
+        for i in 0..2 {
+            stage.n[i] = stage.n[i].map(|x| x + n[i]);
+            stage.source[i] = stage.source[i].map(|x| x + source[i]);
+            n[i] += stage.n_0[i];
+            source[i] += stage.source_0[i];
+        }
+        let m_s = lane(|k| {
+            stage.spin[k] - (stage.cos[k] * stage.n[1][k] - stage.sin[k] * stage.n[0][k])
+                + (start.cos[k] * stage.source[1][k] - start.sin[k] * stage.source[0][k])
+        });
+        let inner = spread::<K>(&rule.backward_columns, &m_s);
+        stage.u = lane(|k| (*m - stage.law[k]) - h * inner[k]);
+        *m -= h * total(&rule.b, &m_s);
     }
 }
 
@@ -1224,13 +1313,13 @@ impl Plane {
         if present.is_some() {
             self.look_points.copy_from_slice(&self.now);
         } else {
-            let count = self.cells.len();
             let weights = self.method.extension(fraction);
-            for (j, points) in self.look_points.iter_mut().enumerate() {
-                *points = self.before[j];
-                for (i, weight) in weights[..self.method.stages].iter().enumerate() {
+            let increments = self.increments.chunks_exact(self.method.stages);
+            for ((points, before), increments) in self.look_points.iter_mut().zip(&self.before).zip(increments) {
+                *points = *before;
+                for (weight, increment) in weights.iter().zip(increments) {
                     for q in 0..3 {
-                        add_scaled(&mut points[q], *weight, &self.increments[i * count + j][q]);
+                        add_scaled(&mut points[q], *weight, &increment[q]);
                     }
                 }
             }
@@ -1575,7 +1664,7 @@ mod tests {
     /// −G at θ, ω, β.
     fn law<const K: usize>(plane: &mut Plane, points: &[Points], ends: &Ends) -> Vec<f64> {
         plane.now.copy_from_slice(points);
-        plane.begin();
+        plane.begin::<K>();
         for stage in &mut plane.stages {
             (stage.p, stage.q) = Default::default();
         }

@@ -98,20 +98,28 @@ pub struct Memory {
     pub kappa: Vec3,
     /// κ_t, κ_tt, body frame.
     pub strain: Motion,
-    /// What a stage of a Runge-Kutta step knows beforehand.
-    pub known: Known,
 }
 
 /// The parts of a stage's coordinates that the stages before it give: θ of the rotation exp(θ) since the beginning of
-/// the step, θ_t, and κ; body frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// the step, θ_t, and κ; body frame. All that a stage asks of the past is here, side by side: of many sections the memory
+/// costs more than what is done with them.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
+    /// R at the beginning of the step.
+    pub rotation: Mat3,
     /// Of θ, rad.
     pub theta: Vec3,
     /// Of θ_t, rad/s.
     pub rate: Vec3,
     /// Of κ, 1/m.
     pub kappa: Vec3,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        let zero = Vec3::zeros();
+        Self { rotation: Mat3::identity(), theta: zero, rate: zero, kappa: zero }
+    }
 }
 
 /// A rod at one instant, with its history.
@@ -123,6 +131,8 @@ pub struct State {
     pub points: Vec<Section>,
     /// Histories of the Gauss points, then of the tip.
     pub memory: Vec<Memory>,
+    /// What a stage of a Runge-Kutta step from here knows beforehand, of each of them.
+    pub known: Vec<Known>,
     /// What held and loaded the rod then.
     pub boundary: Boundary,
     /// Length of the step that led here, s; 0 at a start.
@@ -134,13 +144,13 @@ pub struct State {
 }
 
 archived!(Section { position, rotation, turn, force, moment, acceleration });
-// a stage sets what it knows beforehand
-archived!(Memory { spin, travel, kappa, strain } but { known });
+archived!(Memory { spin, travel, kappa, strain });
 
 /// All but the number of cells: the lists are to be as long as those saved.
 impl Archived for State {
     fn visit(&mut self, archive: &mut Archive) -> Result<(), Corrupt> {
-        let Self { nodes, points, memory, boundary, dt, scheme, row } = self;
+        // a stage sets what it knows beforehand
+        let Self { nodes, points, memory, known: _, boundary, dt, scheme, row } = self;
         nodes.as_mut_slice().visit(archive)?;
         points.as_mut_slice().visit(archive)?;
         memory.as_mut_slice().visit(archive)?;
@@ -158,6 +168,14 @@ pub enum Row {
     Rotations,
     /// From the history of r.
     Positions,
+}
+
+/// A section and its history at the old instant.
+#[derive(Clone, Copy)]
+struct Past<'a> {
+    section: &'a Section,
+    memory: &'a Memory,
+    known: &'a Known,
 }
 
 /// How the new instant hangs on the old one.
@@ -212,23 +230,34 @@ impl Time {
         }
     }
 
+    /// J_r at the turn θ since the old instant.
+    #[inline(always)]
+    fn turned(&self, old: &Past, R: &Mat3) -> so3::Tangent {
+        let theta = match self {
+            Self::Static => Vec3::zeros(),
+            Self::Step { .. } => so3::log(&old.section.rotation.tr_mul(R)),
+            Self::Stage { .. } => so3::log(&old.known.rotation.tr_mul(R)),
+        };
+        so3::Tangent::new(&theta)
+    }
+
     /// ω and ω_t of a section that has turned by θ, where `turned` is.
     #[inline(always)]
-    fn spin(&self, old: &Memory, turned: &so3::Tangent) -> Motion {
+    fn spin(&self, old: &Past, turned: &so3::Tangent) -> Motion {
         match self {
             Self::Stage { .. } => {
                 let (rate, rate_t) = self.rates_of_turn(old, turned);
                 let omega_t = turned.times(&rate_t) + turned.by_log_times(&rate, &rate);
                 Motion::starting(turned.times(&rate), omega_t, Vec3::zeros())
             }
-            _ => self.motion(&old.spin, turned.log()),
+            _ => self.motion(&old.memory.spin, turned.log()),
         }
     }
 
     /// The derivatives of ω and ω_t by φ in the axes of the section; in a stage but for terms of the order of θ ω w in
     /// that of ω_t, small beside w².
     #[inline]
-    fn spin_by_turn(&self, old: &Memory, turned: &so3::Tangent) -> (Mat3, Mat3) {
+    fn spin_by_turn(&self, old: &Past, turned: &so3::Tangent) -> (Mat3, Mat3) {
         let (v, a) = self.weights();
         let W = turned.inverse();
         match self {
@@ -248,19 +277,20 @@ impl Time {
 
     /// θ_t and θ_tt at a stage.
     #[inline]
-    fn rates_of_turn(&self, old: &Memory, turned: &so3::Tangent) -> (Vec3, Vec3) {
+    fn rates_of_turn(&self, old: &Past, turned: &so3::Tangent) -> (Vec3, Vec3) {
         let (weight, _) = self.weights();
         let rate = (turned.log() - old.known.theta) * weight;
         (rate, (rate - old.known.rate) * weight)
     }
 
     /// κ_t = weight κ + offset.
-    fn strain_rate(&self, old: &Memory) -> (f64, Vec3) {
+    fn strain_rate(&self, old: &Past) -> (f64, Vec3) {
         match self {
             Self::Static => (0.0, Vec3::zeros()),
             Self::Step { scheme, dt, .. } => {
                 let weight = scheme.rate_weight(*dt);
-                (weight, scheme.rate(&old.strain.velocity, &Vec3::zeros(), *dt).value - old.kappa * weight)
+                let Memory { strain, kappa, .. } = old.memory;
+                (weight, scheme.rate(&strain.velocity, &Vec3::zeros(), *dt).value - kappa * weight)
             }
             Self::Stage { weight } => (*weight, -old.known.kappa * *weight),
         }
@@ -275,6 +305,7 @@ impl State {
             nodes: vec![Section::default(); mesh.cells.len() + 1],
             points: vec![Section::default(); mesh.points()],
             memory: vec![Memory::default(); mesh.points() + 1],
+            known: vec![Known::default(); mesh.points() + 1],
             boundary: Boundary::hanging_from(*base, Vec3::zeros()),
             dt: 0.0,
             scheme: Scheme::BACKWARD_EULER,
@@ -339,7 +370,7 @@ impl State {
             let vectors = [position, turn, force, moment, acceleration];
             vectors.into_iter().all(finite) && rotation.iter().all(|x| x.is_finite())
         };
-        let memory = |Memory { spin, travel, kappa, strain, known: _ }: &Memory| {
+        let memory = |Memory { spin, travel, kappa, strain }: &Memory| {
             finite(kappa) && [spin, travel, strain].into_iter().all(Motion::is_finite)
         };
         let sections = self.nodes.iter().chain(&self.points).all(section);
@@ -354,6 +385,12 @@ impl State {
     /// The section that the history `i` belongs to.
     pub(crate) fn remembering(&self, i: usize) -> &Section {
         self.points.get(i).unwrap_or(self.tip())
+    }
+
+    /// The past that the history `i` is.
+    #[inline(always)]
+    fn past(&self, i: usize) -> Past<'_> {
+        Past { section: self.remembering(i), memory: &self.memory[i], known: &self.known[i] }
     }
 
     /// The history of the tip.
@@ -426,21 +463,26 @@ impl State {
 
     /// The rotations of the nodes that belong to those of the points.
     pub(crate) fn carry_nodes(&mut self, mesh: &Mesh, base: &Mat3) {
-        let Gauss { stages, b, a_inverse, .. } = &mesh.rule;
         self.nodes[0].rotation = *base;
         for j in 0..mesh.cells.len() {
-            let R_0 = self.nodes[j].rotation;
-            let mut phi = [Vec3::zeros(); MAX_STAGES];
-            for k in 0..*stages {
-                let point = &self.points[j * stages + k];
-                phi[k] = so3::log_near(&R_0.tr_mul(&point.rotation), &point.turn);
-            }
-            let mut turn = Vec3::zeros();
-            for k in 0..*stages {
-                turn += integral(Vec3::zeros(), b[k], &a_inverse[k], &phi, *stages);
-            }
-            self.nodes[j + 1].rotation = R_0 * so3::exp(&turn);
+            self.carry_node(mesh, j);
         }
+    }
+
+    /// The same at the end of cell `j`.
+    pub(crate) fn carry_node(&mut self, mesh: &Mesh, j: usize) {
+        let Gauss { stages, b, a_inverse, .. } = &mesh.rule;
+        let R_0 = self.nodes[j].rotation;
+        let mut phi = [Vec3::zeros(); MAX_STAGES];
+        for k in 0..*stages {
+            let point = &self.points[j * stages + k];
+            phi[k] = so3::log_near(&R_0.tr_mul(&point.rotation), &point.turn);
+        }
+        let mut turn = Vec3::zeros();
+        for k in 0..*stages {
+            turn += integral(Vec3::zeros(), b[k], &a_inverse[k], &phi, *stages);
+        }
+        self.nodes[j + 1].rotation = R_0 * so3::exp(&turn);
     }
 
     /// Makes room for `cells` cells more.
@@ -448,6 +490,7 @@ impl State {
         self.nodes.reserve(cells);
         self.points.reserve(cells * stages);
         self.memory.reserve(cells * stages);
+        self.known.reserve(cells * stages);
     }
 
     /// Makes it a state on as many cells, which is to be set.
@@ -455,22 +498,28 @@ impl State {
         self.nodes.resize(cells + 1, Section::default());
         self.points.resize(cells * stages, Section::default());
         self.memory.resize(cells * stages + 1, Memory::default());
+        self.known.resize(cells * stages + 1, Known::default());
     }
 
-    /// Copies, without allocating where there is room for as many cells.
+    /// Copies all but what a stage knows, without allocating where there is room for as many cells.
     pub fn copy_from(&mut self, other: &Self) {
-        self.copy_sections_from(other);
         self.memory.clone_from(&other.memory);
+        self.go_on_from(other);
+    }
+
+    /// The same but for what [`Self::settle`] sets: the histories of the points.
+    pub(crate) fn go_on_from(&mut self, other: &Self) {
+        self.nodes.clone_from(&other.nodes);
+        self.points.clone_from(&other.points);
+        self.memory.resize(other.memory.len(), Memory::default());
+        self.known.resize(other.known.len(), Known::default());
+        if let (Some(tip), Some(given)) = (self.memory.last_mut(), other.memory.last()) {
+            *tip = *given;
+        }
         self.boundary = other.boundary;
         self.dt = other.dt;
         self.scheme = other.scheme;
         self.row = other.row;
-    }
-
-    /// The sections alone.
-    pub(crate) fn copy_sections_from(&mut self, other: &Self) {
-        self.nodes.clone_from(&other.nodes);
-        self.points.clone_from(&other.points);
     }
 
     /// Applies μ times the increments of a sweep.
@@ -523,12 +572,25 @@ impl State {
 
     /// Makes a converged iterate a state: memories, and what the row in use did not need.
     pub fn settle(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
+        self.settle_and_take(mesh, rod, old, boundary, time, |_, _| {});
+    }
+
+    /// [`Self::settle`] where `take` gets θ_t, θ_tt and κ_t of every history, of a stage.
+    pub(crate) fn settle_and_take(
+        &mut self,
+        mesh: &Mesh,
+        rod: &Rod,
+        old: &Self,
+        boundary: &Boundary,
+        time: &Time,
+        take: impl FnMut(usize, [Vec3; 3]),
+    ) {
         self.boundary = *boundary;
         for section in self.nodes.iter_mut().chain(self.points.iter_mut()) {
             section.rotation = so3::orthonormalised(&section.rotation);
         }
         self.take_turns(mesh);
-        self.take_rates(mesh, rod, old, time);
+        self.take_rates(mesh, rod, old, time, take);
         let drag = rod.drag_rate();
         self.rebuild_positions(mesh, rod);
         match time {
@@ -563,30 +625,64 @@ impl State {
         }
     }
 
-    /// As much of [`Self::settle`] as a stage that others follow needs: its rates.
-    pub(crate) fn settle_within(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, boundary: &Boundary, time: &Time) {
+    /// As much of [`Self::settle_and_take`] as a stage that others follow needs: its rates.
+    pub(crate) fn settle_within(
+        &mut self,
+        mesh: &Mesh,
+        rod: &Rod,
+        old: &Self,
+        boundary: &Boundary,
+        time: &Time,
+        mut take: impl FnMut(usize, [Vec3; 3]),
+    ) {
         self.boundary = *boundary;
-        self.take_rates(mesh, rod, old, time);
-        self.rebuild_velocities(mesh);
+        let stages = mesh.rule.stages;
+        let mut velocity = boundary.base.velocity;
+        for j in 0..mesh.cells.len() {
+            for i in j * stages..(j + 1) * stages {
+                self.take_rate(i, mesh, rod, old, time, &mut take);
+            }
+            velocity = self.rebuild_velocity(mesh, j, velocity);
+        }
+        let tip = self.memory.len() - 1;
+        self.take_rate(tip, mesh, rod, old, time, &mut take);
+        self.memory[tip].travel.velocity.value = velocity;
     }
 
-    /// ω and ω_t, κ and its rates.
-    fn take_rates(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, time: &Time) {
+    /// ω and ω_t, κ and its rates; `take` as in [`Self::settle_and_take`].
+    fn take_rates(&mut self, mesh: &Mesh, rod: &Rod, old: &Self, time: &Time, mut take: impl FnMut(usize, [Vec3; 3])) {
         for i in 0..self.memory.len() {
-            let theta = so3::log(&old.remembering(i).rotation.tr_mul(&self.remembering(i).rotation));
-            self.memory[i].spin = time.spin(&old.memory[i], &so3::Tangent::new(&theta));
+            self.take_rate(i, mesh, rod, old, time, &mut take);
         }
-        for (i, section) in self.points.iter().enumerate() {
-            let cell = &mesh.cells[i / mesh.rule.stages];
-            let (memory, past) = (&mut self.memory[i], &old.memory[i]);
-            memory.kappa = Law::new(rod, &cell.kappa_rest, time, past).kappa(&section.rotation.tr_mul(&section.moment));
+    }
+
+    /// The same of the history `i`.
+    #[inline(always)]
+    fn take_rate(
+        &mut self,
+        i: usize,
+        mesh: &Mesh,
+        rod: &Rod,
+        old: &Self,
+        time: &Time,
+        take: &mut impl FnMut(usize, [Vec3; 3]),
+    ) {
+        let past = &old.past(i);
+        let turned = time.turned(past, &self.remembering(i).rotation);
+        let memory = &mut self.memory[i];
+        memory.spin = time.spin(past, &turned);
+        if let Some(section) = self.points.get(i) {
+            let law = Law::new(rod, &mesh.cells[i / mesh.rule.stages].kappa_rest, time, past);
+            memory.kappa = law.kappa(&section.rotation.tr_mul(&section.moment));
             memory.strain = match time {
                 Time::Stage { weight } => {
                     Motion::starting((memory.kappa - past.known.kappa) * *weight, Vec3::zeros(), Vec3::zeros())
                 }
-                _ => time.motion(&past.strain, &(memory.kappa - past.kappa)),
+                _ => time.motion(&past.memory.strain, &(memory.kappa - past.memory.kappa)),
             };
         }
+        let (theta_t, theta_tt) = time.rates_of_turn(past, &turned);
+        take(i, [theta_t, theta_tt, memory.strain.velocity.value]);
     }
 
     /// Turns the section that the history `i` belongs to by θ from `begin`, with θ_t and θ_tt, and gives it κ_t; the
@@ -686,23 +782,28 @@ impl State {
 
     /// Integrates u_s = R (ω × e₃) along the rod from the base.
     pub(crate) fn rebuild_velocities(&mut self, mesh: &Mesh) {
-        let Gauss { stages, a, b, .. } = &mesh.rule;
-        let mut start = self.boundary.base.velocity;
-        for (j, cell) in mesh.cells.iter().enumerate() {
-            let first = j * stages;
-            let mut slopes = [Vec3::zeros(); MAX_STAGES];
-            for l in 0..*stages {
-                let omega = self.memory[first + l].spin.velocity.value;
-                slopes[l] = self.points[first + l].rotation * omega.cross(&Vec3::z());
-            }
-            for k in 0..*stages {
-                self.memory[first + k].travel.velocity.value = integral(start, cell.length, &a[k], &slopes, *stages);
-            }
-            start = integral(start, cell.length, b, &slopes, *stages);
+        let mut velocity = self.boundary.base.velocity;
+        for j in 0..mesh.cells.len() {
+            velocity = self.rebuild_velocity(mesh, j, velocity);
         }
         if let Some(tip) = self.memory.last_mut() {
-            tip.travel.velocity.value = start;
+            tip.travel.velocity.value = velocity;
         }
+    }
+
+    /// The same through cell `j`, from `start` at its first node; returns that at the second.
+    fn rebuild_velocity(&mut self, mesh: &Mesh, j: usize, start: Vec3) -> Vec3 {
+        let Gauss { stages, a, b, .. } = &mesh.rule;
+        let (first, h) = (j * stages, mesh.cells[j].length);
+        let mut slopes = [Vec3::zeros(); MAX_STAGES];
+        for l in 0..*stages {
+            let omega = self.memory[first + l].spin.velocity.value;
+            slopes[l] = self.points[first + l].rotation * omega.cross(&Vec3::z());
+        }
+        for k in 0..*stages {
+            self.memory[first + k].travel.velocity.value = integral(start, h, &a[k], &slopes, *stages);
+        }
+        integral(start, h, b, &slopes, *stages)
     }
 }
 
@@ -753,7 +854,7 @@ struct Law {
 
 impl Law {
     #[inline]
-    fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Memory) -> Self {
+    fn new(rod: &Rod, kappa_rest: &Vec3, time: &Time, old: &Past) -> Self {
         let (weight, offset) = time.strain_rate(old);
         let factor = rod.damping.map(|tau| 1.0 + tau * weight);
         let free = kappa_rest - rod.damping.component_mul(&offset);
@@ -810,9 +911,9 @@ impl Equations<'_> {
         }
     }
 
-    /// At `section` of a cell that begins with `R_0`, which was `begin`, with the memory `past`, at the old instant.
+    /// At `section` of a cell that begins with `R_0`.
     #[inline(always)]
-    fn at(&self, kappa_rest: &Vec3, R_0: &Mat3, section: &Section, begin: &Section, past: &Memory) -> Terms {
+    fn at(&self, kappa_rest: &Vec3, R_0: &Mat3, section: &Section, past: &Past) -> Terms {
         let Self { rod, time, drag, .. } = self;
         let Section { rotation: R, force: n, moment: m, .. } = section;
 
@@ -823,11 +924,7 @@ impl Equations<'_> {
         let g = map.inverse_times(&law.kappa(&stress));
 
         // ω and ω_t from the history
-        let theta = match time {
-            Time::Static => Vec3::zeros(),
-            _ => so3::log(&begin.rotation.tr_mul(R)),
-        };
-        let turned = so3::Tangent::new(&theta);
+        let turned = time.turned(past, R);
         let spin = time.spin(past, &turned);
 
         // a, or its slope
@@ -835,7 +932,7 @@ impl Equations<'_> {
         let (w_s, distributed) = match self.row {
             Row::Rotations => (R * acceleration_slope(&spin, *drag), section.acceleration),
             Row::Positions => {
-                let travel = time.motion(&past.travel, &(section.position - begin.position));
+                let travel = time.motion(&past.memory.travel, &(section.position - past.section.position));
                 (r_s, travel.acceleration.value + travel.velocity.value * *drag)
             }
         };
@@ -851,7 +948,7 @@ impl Equations<'_> {
 
     /// The derivatives of what [`Self::at`] says.
     #[inline]
-    fn derivatives(&self, R_0: &Mat3, section: &Section, past: &Memory, terms: &Terms) -> Point {
+    fn derivatives(&self, R_0: &Mat3, section: &Section, past: &Past, terms: &Terms) -> Point {
         let Self { rod, time, drag, .. } = self;
         let Section { rotation: R, force: n, .. } = section;
         let Terms { law, stress, map, g, turned, spin, r_s, w_s, rotary, m_s, .. } = terms;
@@ -914,17 +1011,17 @@ impl Equations<'_> {
             let (node_0, node_1) = (&state.nodes[j], &state.nodes[j + 1]);
             let first = j * K;
             let points = &state.points[first..][..K];
-            let (begin, past) = (&old.points[first..][..K], &old.memory[first..][..K]);
             let R_0 = &node_0.rotation;
             let zero = [Vec3::zeros(); K];
             let (mut log, mut g, mut w_s, mut n_s, mut m_s, mut p, mut p_s) =
                 (zero, zero, zero, zero, zero, zero, zero);
             for k in 0..K {
-                let terms = self.at(&cell.kappa_rest, R_0, &points[k], &begin[k], &past[k]);
+                let past = &old.past(first + k);
+                let terms = self.at(&cell.kappa_rest, R_0, &points[k], past);
                 (log[k], g[k], w_s[k], n_s[k]) = (*terms.map.log(), terms.g, terms.w_s, terms.n_s);
                 (m_s[k], p[k], p_s[k]) = (terms.m_s, terms.p, terms.p_s);
                 if BLOCKS {
-                    system.points[first + k] = self.derivatives(R_0, &points[k], &past[k], &terms);
+                    system.points[first + k] = self.derivatives(R_0, &points[k], past, &terms);
                 }
             }
             let log_1 = so3::log_near(&R_0.tr_mul(&node_1.rotation), &node_1.turn);
@@ -1041,23 +1138,22 @@ fn assemble_parts<const BLOCKS: bool>(
 
     // the tip carries its loads and the body on it
     let tip = state.tip();
-    let old_tip = old.tip();
-    let past = old.tip_memory();
+    let past = &old.past(state.points.len());
     system.tip_load = Default::default();
     residuals.tip_load = (boundary.tip_force - tip.force, boundary.tip_moment - tip.moment);
     if rod.tip_mass > 0.0 {
         let (a_tip, by_w) = match row {
             Row::Rotations => (tip.acceleration - tip_velocity(mesh, old, state, boundary, time) * drag, 1.0),
             Row::Positions => {
-                (time.motion(&past.travel, &(tip.position - old_tip.position)).acceleration.value, weight_a)
+                (time.motion(&past.memory.travel, &(tip.position - past.section.position)).acceleration.value, weight_a)
             }
         };
         residuals.tip_load.0 += (gravity - a_tip) * rod.tip_mass;
         system.tip_load.n_w = Mat3::from_diagonal_element(-rod.tip_mass * by_w);
     }
     if rod.tip_inertia > 0.0 && *time != Time::Static {
-        let turned = so3::Tangent::new(&so3::log(&old_tip.rotation.tr_mul(&tip.rotation)));
         let R = tip.rotation;
+        let turned = time.turned(past, &R);
         let turning = R * time.spin(past, &turned).acceleration.value;
         let W = turned.inverse() * R.transpose();
         residuals.tip_load.1 -= turning * rod.tip_inertia;
@@ -1121,8 +1217,8 @@ fn tip_velocity(mesh: &Mesh, old: &State, state: &State, boundary: &Boundary, ti
     let stages = mesh.rule.stages;
     let mut u = boundary.base.velocity;
     for (i, section) in state.points.iter().enumerate() {
-        let theta = so3::log(&old.points[i].rotation.tr_mul(&section.rotation));
-        let omega = time.spin(&old.memory[i], &so3::Tangent::new(&theta)).velocity.value;
+        let past = &old.past(i);
+        let omega = time.spin(past, &time.turned(past, &section.rotation)).velocity.value;
         let weight = mesh.cells[i / stages].length * mesh.rule.b[i % stages];
         u += section.rotation * omega.cross(&Vec3::z()) * weight;
     }

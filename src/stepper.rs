@@ -10,11 +10,11 @@ use crate::alpha::{Motion, Scheme};
 use crate::boundary::{Boundary, Held, Support};
 use crate::energy::Powers;
 use crate::mesh::{Cell, Mesh};
-use crate::pose::{self, Known, Row, Section, State, Time};
+use crate::pose::{self, Row, Section, State, Time};
 use crate::rod::Rod;
 use crate::runge_kutta::{self, RungeKutta};
 use crate::so3;
-use crate::sweep::{Increment, Residuals, Scales, Singular, Sweep, System, larger};
+use crate::sweep::{Increment, Largest, Residuals, Scales, Singular, Sweep, System, larger};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
@@ -59,6 +59,8 @@ const SMOOTH: f64 = 0.25;
 const NEGLIGIBLE: f64 = 1e-6;
 /// Part of a step by which the next may differ and still be the same: hosts take the differences of rounded times.
 const ROUND_OFF: f64 = 1e-9;
+/// Stages before one that its guess goes on from.
+const ONWARD: usize = 3;
 /// Part of the static loads below which the equilibrium is given up.
 const SMALLEST_LOAD_PART: f64 = 1e-4;
 
@@ -173,25 +175,6 @@ enum Guess {
     Near,
 }
 
-/// The largest increments of an iteration.
-struct Largest {
-    turn: f64,
-    force: f64,
-    moment: f64,
-}
-
-impl Largest {
-    fn of(sweep: &Sweep) -> Self {
-        let mut largest = Self { turn: 0.0, force: 0.0, moment: 0.0 };
-        for delta in sweep.nodes.iter().chain(&sweep.points) {
-            largest.turn = larger(largest.turn, delta.phi.norm());
-            largest.force = larger(largest.force, delta.n.amax());
-            largest.moment = larger(largest.moment, delta.m.amax());
-        }
-        largest
-    }
-}
-
 /// A rod on a mesh with the storage to move it; after its construction nothing is allocated.
 #[derive(Clone, Debug)]
 pub struct Stepper {
@@ -203,8 +186,6 @@ pub struct Stepper {
     pub state: State,
     old: State,
     trial: State,
-    /// The sections that a stage begins with.
-    guess: State,
     /// Within the last step of order 4.
     seen: State,
     /// Its length, s, and method.
@@ -212,10 +193,10 @@ pub struct Stepper {
     method: &'static RungeKutta,
     system: System,
     sweep: Sweep,
-    /// The rates at the stages of a step of order 4, of everything that has a history.
-    stages: Vec<[Rates; runge_kutta::MAX_STAGES]>,
-    /// What the sections carry there, of the nodes and then of the points.
-    carried: Vec<[Carried; runge_kutta::MAX_STAGES]>,
+    /// The rates of everything that has a history, stage by stage of a step of order 4.
+    stages: Vec<Rates>,
+    /// What the sections carry at the last stages, of the nodes and then of the points; of stage i at i modulo [`ONWARD`].
+    carried: Vec<Carried>,
 }
 
 impl Stepper {
@@ -224,12 +205,11 @@ impl Stepper {
         let extensible = rod.is_extensible();
         let system = System::new(mesh.cells.len(), &mesh.rule, extensible);
         let sweep = Sweep::new(mesh.cells.len(), &mesh.rule, extensible);
-        let stages = vec![Default::default(); state.memory.len()];
-        let carried = vec![Default::default(); state.nodes.len() + state.points.len()];
+        let stages = vec![Default::default(); runge_kutta::MAX_STAGES * state.memory.len()];
+        let carried = vec![Default::default(); ONWARD * (state.nodes.len() + state.points.len())];
         Self {
             old: state.clone(),
             trial: state.clone(),
-            guess: state.clone(),
             seen: state.clone(),
             span: 0.0,
             method: &runge_kutta::ESDIRK4,
@@ -248,8 +228,8 @@ impl Stepper {
         let count = self.mesh.cells.len();
         let (most, stages) = (cells.max(count), self.mesh.rule.stages);
         self.mesh.cells.reserve(most - count);
-        let Self { state, old, trial, guess, seen, .. } = self;
-        for state in [state, old, trial, guess, seen] {
+        let Self { state, old, trial, seen, .. } = self;
+        for state in [state, old, trial, seen] {
             state.reserve(most - count, stages);
         }
         self.resize(most);
@@ -276,8 +256,8 @@ impl Stepper {
         let points = cells * mesh.rule.stages;
         system.resize(cells, &mesh.rule);
         sweep.resize(cells);
-        stages.resize(points + 1, Default::default());
-        carried.resize(points + cells + 1, Default::default());
+        stages.resize(runge_kutta::MAX_STAGES * (points + 1), Default::default());
+        carried.resize(ONWARD * (points + cells + 1), Default::default());
     }
 
     /// Exchanges the cells; the new mesh, the rod, the present state and the one on the new mesh, which is to be set.
@@ -422,17 +402,27 @@ impl Stepper {
         let time = Time::Stage { weight };
         (self.span, self.method) = (h, method);
         self.old.copy_from(&self.state);
-        self.trial.copy_from(&self.state);
+        self.trial.go_on_from(&self.state);
         let begin = drive(0.0);
-        self.take_rates(0, weight);
+        for m in 0..self.old.memory.len() {
+            self.old.known[m].rotation = self.old.remembering(m).rotation;
+            let (rates, memory) = (&mut self.stages[m], &self.old.memory[m]);
+            // θ = 0: θ_t = ω, θ_tt = ω_t
+            *rates = Rates {
+                theta_t: memory.spin.velocity.value,
+                theta_tt: memory.spin.acceleration.value,
+                kappa_t: memory.strain.velocity.value,
+            };
+        }
+        self.take_carried(0);
         let mut work = Powers::of(&self.mesh, &self.rod, &self.old, &begin).times(h * method.weight(0));
         let mut iterations = 0;
         let mut factors = Factors::Missing;
         for i in 1..method.stages {
             let boundary = drive(method.c[i] * h);
             for guess in [Guess::Smooth, Guess::Near] {
-                self.prepare_stage(i, h, weight, &boundary, guess);
-                match self.stage(&boundary, &time, accuracy, &mut factors) {
+                let prepare = |stepper: &mut Self| stepper.prepare_stage(i, h, weight, &boundary, guess);
+                match self.stage(prepare, &boundary, &time, accuracy, &mut factors) {
                     Ok(taken) => {
                         iterations += taken;
                         break;
@@ -447,9 +437,17 @@ impl Stepper {
                 }
             }
             let last = i == method.stages - 1;
-            let settle = if last { State::settle } else { State::settle_within };
-            settle(&mut self.trial, &self.mesh, &self.rod, &self.old, &boundary, &time);
-            self.take_rates(i, weight);
+            let Self { mesh, rod, old, trial, stages, .. } = self;
+            let rates = &mut stages[i * old.memory.len()..];
+            let take = |m: usize, [theta_t, theta_tt, kappa_t]: [Vector3<f64>; 3]| {
+                rates[m] = Rates { theta_t, theta_tt, kappa_t }
+            };
+            if last {
+                trial.settle_and_take(mesh, rod, old, &boundary, &time, take);
+            } else {
+                trial.settle_within(mesh, rod, old, &boundary, &time, take);
+            }
+            self.take_carried(i);
             work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * method.weight(i));
         }
         let error = self.error(h);
@@ -475,11 +473,12 @@ impl Stepper {
     pub fn look(&mut self, fraction: f64, boundary: &Boundary) -> &State {
         let Self { mesh, rod, old, stages, seen, span, method, .. } = self;
         seen.copy_from(old);
-        for (m, rates) in stages.iter().enumerate() {
-            let (first, last) = (&rates[0], &rates[method.stages - 1]);
+        let count = old.memory.len();
+        for m in 0..count {
+            let (first, last) = (&stages[m], &stages[(method.stages - 1) * count + m]);
             let grown = |rate: fn(&Rates) -> Vector3<f64>| {
-                let sum = |sum, (j, rates)| sum + rate(rates) * (*span * method.weight(j));
-                rates[..method.stages].iter().enumerate().fold(Vector3::zeros(), sum)
+                let sum = |sum, j| sum + rate(&stages[j * count + m]) * (*span * method.weight(j));
+                (0..method.stages).fold(Vector3::zeros(), sum)
             };
             let begin = [Vector3::zeros(), first.theta_t, first.theta_tt];
             let end = [grown(|rates| rates.theta_t), last.theta_t, last.theta_tt];
@@ -503,59 +502,69 @@ impl Stepper {
             Guess::Smooth => (method.onward(i, 3), method.onward(i, 3)),
             Guess::Near => (method.onward(i, 2), method.onward(i, 1)),
         };
-        for (m, rates) in stages.iter().enumerate() {
-            let memory = &mut old.memory[m];
-            let mut known = Known { theta: Vector3::zeros(), rate: memory.spin.velocity.value, kappa: memory.kappa };
-            for (j, Rates { theta_t, theta_tt, kappa_t }) in rates[..i].iter().enumerate() {
-                let a = h * method.a[i][j];
-                known.theta += theta_t * a;
-                known.rate += theta_tt * a;
-                known.kappa += kappa_t * a;
-            }
-            memory.known = known;
-            let theta_tt = (0..i).fold(Vector3::zeros(), |sum, j| sum + rates[j].theta_tt * on[j]);
-            let theta = known.theta + (known.rate + theta_tt / weight) / weight;
-            if let (Some(point), Some(begin)) = (trial.points.get_mut(m), old.points.get(m)) {
-                point.rotation = begin.rotation * so3::exp(&theta);
-            }
-        }
-        trial.carry_nodes(mesh, &boundary.base.rotation);
-        let last = i.saturating_sub(3)..i;
-        for (section, carried) in trial.nodes.iter_mut().chain(&mut trial.points).zip(carried) {
+        let (count, sections) = (old.memory.len(), old.nodes.len() + old.points.len());
+        let last = i.saturating_sub(ONWARD)..i;
+        let carry = |section: &mut Section, index: usize| {
             let mut on = Carried::default();
-            for (carried, weight) in carried[last.clone()].iter().zip(&carried_on[last.clone()]) {
-                on.force += carried.force * *weight;
-                on.moment += carried.moment * *weight;
-                on.acceleration += carried.acceleration * *weight;
+            for j in last.clone() {
+                let (carried, weight) = (&carried[j % ONWARD * sections + index], carried_on[j]);
+                on.force += carried.force * weight;
+                on.moment += carried.moment * weight;
+                on.acceleration += carried.acceleration * weight;
             }
             (section.force, section.moment, section.acceleration) = (on.force, on.moment, on.acceleration);
+        };
+        let (per_cell, nodes) = (mesh.rule.stages, old.nodes.len());
+        trial.nodes[0].rotation = boundary.base.rotation;
+        carry(&mut trial.nodes[0], 0);
+        for m in 0..count {
+            let known = &mut old.known[m];
+            // θ_t = ω where θ = 0
+            (known.theta, known.rate, known.kappa) = (Vector3::zeros(), stages[m].theta_t, old.memory[m].kappa);
+            let mut theta_tt = Vector3::zeros();
+            for j in 0..i {
+                let (rates, a) = (&stages[j * count + m], h * method.a[i][j]);
+                known.theta += rates.theta_t * a;
+                known.rate += rates.theta_tt * a;
+                known.kappa += rates.kappa_t * a;
+                theta_tt += rates.theta_tt * on[j];
+            }
+            let theta = known.theta + (known.rate + theta_tt / weight) / weight;
+            if let Some(point) = trial.points.get_mut(m) {
+                point.rotation = known.rotation * so3::exp(&theta);
+                carry(point, nodes + m);
+                if m % per_cell == per_cell - 1 {
+                    let cell = m / per_cell;
+                    trial.carry_node(mesh, cell);
+                    carry(&mut trial.nodes[cell + 1], cell + 1);
+                }
+            }
         }
     }
 
-    /// Newton from the guess in `trial` to the stage, in `trial`.
+    /// Newton from the guess that `prepare` puts in `trial` to the stage, in `trial`.
     ///
     /// Factors are kept as long as they soon lead there: increments that fall by the rate q leave an error of q/(1 − q)
     /// times the last. One that hardly falls is not taken; where the factors were another stage's, Newton then begins
     /// anew from the guess.
     fn stage(
         &mut self,
+        prepare: impl Fn(&mut Self),
         boundary: &Boundary,
         time: &Time,
         accuracy: f64,
         factors: &mut Factors,
     ) -> Result<usize, Diverged> {
-        let Self { mesh, rod, system, sweep, old, trial, guess, .. } = self;
-        let (scales, rounding) = scales(mesh, rod, old, boundary, time);
+        prepare(self);
+        let (scales, rounding) = scales(&self.mesh, &self.rod, &self.old, boundary, time);
         let target = (accuracy * PART_LEFT).clamp(FINEST, 1e-5);
         let mut keep = *factors == Factors::Good;
         let mut borrowed = keep;
-        if borrowed {
-            guess.copy_sections_from(trial);
-        }
         let mut before = f64::INFINITY;
         let (mut iterations, mut factorised) = (0, 0);
         loop {
             iterations += 1;
+            let Self { mesh, rod, system, sweep, old, trial, .. } = self;
             let diverged = |system: &System, reason| {
                 Err(Diverged { iterations, residual: system.residuals.largest(&scales), reason })
             };
@@ -569,7 +578,7 @@ impl Stepper {
                     return diverged(system, Reason::Singular(singular));
                 }
             }
-            let Largest { turn, force, moment } = Largest::of(sweep);
+            let Largest { turn, force, moment } = sweep.largest;
             let size = larger(turn, if force < ROUNDINGS * rounding { 0.0 } else { force / scales.force });
             // 0 where there was none before
             let rate = size / before;
@@ -577,7 +586,7 @@ impl Stepper {
                 keep = false;
                 if borrowed {
                     (borrowed, *factors, before) = (false, Factors::Poor, f64::INFINITY);
-                    trial.copy_sections_from(guess);
+                    prepare(self);
                 }
                 continue;
             }
@@ -606,28 +615,13 @@ impl Stepper {
         }
     }
 
-    /// The rates of the coordinates at stage `i`, which is settled in `trial`.
-    fn take_rates(&mut self, i: usize, weight: f64) {
-        let Self { old, trial, stages, carried, .. } = self;
-        for (section, carried) in trial.nodes.iter().chain(&trial.points).zip(carried) {
+    /// What the sections carry at stage `i`, which is in `trial`.
+    fn take_carried(&mut self, i: usize) {
+        let Self { trial, carried, .. } = self;
+        let first = i % ONWARD * (trial.nodes.len() + trial.points.len());
+        for (section, carried) in trial.nodes.iter().chain(&trial.points).zip(&mut carried[first..]) {
             let Section { force, moment, acceleration, .. } = *section;
-            carried[i] = Carried { force, moment, acceleration };
-        }
-        for (m, rates) in stages.iter_mut().enumerate() {
-            let memory = &trial.memory[m];
-            rates[i] = if i == 0 {
-                // θ = 0: θ_t = ω, θ_tt = ω_t
-                Rates {
-                    theta_t: memory.spin.velocity.value,
-                    theta_tt: memory.spin.acceleration.value,
-                    kappa_t: memory.strain.velocity.value,
-                }
-            } else {
-                let known = &old.memory[m].known;
-                let theta = so3::log(&old.remembering(m).rotation.tr_mul(&trial.remembering(m).rotation));
-                let theta_t = (theta - known.theta) * weight;
-                Rates { theta_t, theta_tt: (theta_t - known.rate) * weight, kappa_t: memory.strain.velocity.value }
-            };
+            *carried = Carried { force, moment, acceleration };
         }
     }
 
@@ -637,11 +631,10 @@ impl Stepper {
         let mut way = Vector3::zeros();
         let mut most = 0.0f64;
         let per_cell = mesh.rule.stages;
-        for (m, (section, rates)) in old.points.iter().zip(stages).enumerate() {
-            let theta = rates[..method.stages]
-                .iter()
-                .enumerate()
-                .fold(Vector3::zeros(), |sum, (j, rates)| sum + rates.theta_t * (h * method.error_weight(j)));
+        for (m, section) in old.points.iter().enumerate() {
+            let theta = (0..method.stages).fold(Vector3::zeros(), |sum, j| {
+                sum + stages[j * old.memory.len() + m].theta_t * (h * method.error_weight(j))
+            });
             let length = mesh.cells[m / per_cell].length * mesh.rule.b[m % per_cell];
             way += section.rotation * theta.cross(&Vector3::z()) * length;
             if m % per_cell == per_cell - 1 {
@@ -695,7 +688,7 @@ impl Stepper {
             }
             sweep.solve(system).map_err(|s| diverged(residual, Reason::Singular(s)))?;
 
-            let Largest { turn, force, moment } = Largest::of(sweep);
+            let Largest { turn, force, moment } = sweep.largest;
             if !(turn + force + moment).is_finite() {
                 return Err(diverged(residual, Reason::NotFinite));
             }

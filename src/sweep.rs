@@ -414,6 +414,28 @@ impl fmt::Display for Singular {
 
 impl std::error::Error for Singular {}
 
+/// The largest increments of a solution.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Largest {
+    /// |φ|, rad.
+    pub turn: f64,
+    /// Of a component of n, N.
+    pub force: f64,
+    /// Of a component of m, N·m.
+    pub moment: f64,
+}
+
+impl Largest {
+    #[inline(always)]
+    fn with<const V: usize, const S: usize>(self, delta: &Increment<V, S>) -> Self {
+        Self {
+            turn: larger(self.turn, delta.phi.norm()),
+            force: larger(self.force, delta.n.amax()),
+            moment: larger(self.moment, delta.m.amax()),
+        }
+    }
+}
+
 /// One number for each of the `K` Gauss points of a cell.
 type Lanes<const K: usize> = [f64; K];
 /// A matrix for each of them, entry by entry.
@@ -686,6 +708,8 @@ pub struct Sweep<const V: usize = 3, const S: usize = 3> {
     pub nodes: Vec<Increment<V, S>>,
     /// Increments of the Gauss points after [`Sweep::solve_for`].
     pub points: Vec<Increment<V, S>>,
+    /// The largest of them.
+    pub largest: Largest,
 }
 
 impl<const V: usize, const S: usize> Sweep<V, S> {
@@ -713,6 +737,7 @@ impl<const V: usize, const S: usize> Sweep<V, S> {
             }),
             nodes: vec![Increment::default(); cells + 1],
             points: vec![Increment::default(); cells * rule.stages],
+            largest: Largest::default(),
         }
     }
 
@@ -1170,6 +1195,7 @@ impl<const V: usize, const S: usize> Sweep<V, S> {
         };
         let (n, m) = self.relations[0].at(&self.loads[0], &w, &phi);
         self.nodes[0] = Increment { w, phi, n, m };
+        let mut largest = Largest::default().with(&self.nodes[0]);
 
         for (cell, CellEnds { length: h, spin: spin_1, .. }) in self.cells.iter().enumerate() {
             let (e, e_ends) = of_cell(cell);
@@ -1227,9 +1253,13 @@ impl<const V: usize, const S: usize> Sweep<V, S> {
                     n: SVector::from_fn(|i, _| n[i][k]),
                     m: SVector::from_fn(|i, _| m[i][k]),
                 };
+                largest = largest.with(point);
             }
-            self.nodes[cell + 1] = Increment { w: w_1, phi: phi_1, n: n_1, m: m_1 };
+            let node = Increment { w: w_1, phi: phi_1, n: n_1, m: m_1 };
+            largest = largest.with(&node);
+            self.nodes[cell + 1] = node;
         }
+        self.largest = largest;
     }
 }
 
