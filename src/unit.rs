@@ -10,13 +10,13 @@ use crate::energy::Energy;
 use crate::integrator::{Effort, Ends, Failed, Integrator, Way};
 use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
-use crate::path::{Given, Path, Sample, Segment};
+use crate::path::{Given, Onward, Path, Sample, Segment};
 use crate::pose::State;
 use crate::refine::Refiner;
 use crate::rod::Rod;
 use crate::so3;
 use crate::stepper::{Diverged, Stepper};
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{SVector, Vector3, Vector4};
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -176,6 +176,82 @@ impl Default for Inputs {
     }
 }
 
+/// First and second derivatives of the inputs at the beginning of a communication step, in which they are
+/// x + x' t + x'' t²/2; NaN where none is given. In a vector of which any is given, the others count as zero.
+#[derive(Clone, Debug)]
+pub struct Derivatives {
+    /// Of order 1.
+    pub first: Inputs,
+    /// Of order 2.
+    pub second: Inputs,
+}
+
+archived!(Derivatives { first, second });
+
+impl Default for Derivatives {
+    /// None.
+    fn default() -> Self {
+        let (vector, quaternion) = (Vector3::repeat(f64::NAN), Vector4::repeat(f64::NAN));
+        let none = Inputs {
+            base_position: vector,
+            base_orientation: quaternion,
+            base_velocity: vector,
+            base_angular_velocity: vector,
+            tip_force: vector,
+            tip_moment: vector,
+        };
+        Self { first: none.clone(), second: none }
+    }
+}
+
+/// A vector and its derivatives, as far as any are given.
+type Course<const N: usize> = (SVector<f64, N>, [Option<SVector<f64, N>>; 2]);
+
+impl Derivatives {
+    /// Refuses what is infinite.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] names the first input with such a derivative.
+    pub fn validate(&self) -> Result<(), Error> {
+        match self.first.components().chain(self.second.components()).find(|(_, value)| value.is_infinite()) {
+            Some((name, value)) => {
+                let allowed = Allowed::Such("a finite derivative by time");
+                Err(Error::NotAllowed { name, value, allowed })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn of<const N: usize>(&self, vector: fn(&Inputs) -> SVector<f64, N>) -> [Option<SVector<f64, N>>; 2] {
+        let given = |inputs: &Inputs| {
+            let values = vector(inputs);
+            let zero_for_none = |value: f64| if value.is_nan() { 0.0 } else { value };
+            values.iter().any(|value| !value.is_nan()).then(|| values.map(zero_for_none))
+        };
+        let second = given(&self.second);
+        [given(&self.first).or(second.map(|_| SVector::zeros())), second]
+    }
+
+    /// What the path of the base has to know.
+    fn onward(&self, inputs: &Inputs) -> Onward {
+        Onward {
+            position: self.of(|inputs| inputs.base_position),
+            rotation: so3::turning(&inputs.base_orientation, self.of(|inputs| inputs.base_orientation)),
+            velocity: self.of(|inputs| inputs.base_velocity),
+            angular_velocity: self.of(|inputs| inputs.base_angular_velocity),
+        }
+    }
+}
+
+/// A vector and its rate `time` s after the beginning of the step.
+fn at<const N: usize>((value, [first, second]): &Course<N>, time: f64) -> [SVector<f64, N>; 2] {
+    match (first, second) {
+        (Some(first), Some(second)) => [value + first * time + second * (0.5 * time * time), first + second * time],
+        (Some(first), None) => [value + first * time, *first],
+        (None, _) => [*value, SVector::zeros()],
+    }
+}
+
 /// What the host may read at every communication point, world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
@@ -197,7 +273,7 @@ pub struct Outputs {
     pub energy: Energy,
     /// Rate of `energy.work_base`: what the base does on the rod, W.
     pub power_base: f64,
-    /// Rate of `energy.work_tip`, under the load of the step that ends here, W.
+    /// Rate of `energy.work_tip`, under the load with which the last step ended, W.
     pub power_tip: f64,
     /// Cells in use.
     pub cells: i32,
@@ -407,6 +483,8 @@ pub struct Unit {
     gravity: Vector3<f64>,
     path: Path,
     warned: bool,
+    /// What acts at the end of the last step.
+    drive: Drive,
     outputs: Outputs,
 }
 
@@ -615,6 +693,22 @@ impl Inputs {
     /// # Errors
     /// [`Error::NotAllowed`] names the first input.
     pub fn validate(&self) -> Result<(), Error> {
+        if let Some((name, value)) = self.components().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::NotAllowed { name, value, allowed: Allowed::Finite });
+        }
+        let norm = self.base_orientation.norm();
+        if !(norm > 1e-100 && norm.is_finite()) {
+            return Err(Error::NotAllowed {
+                name: "base.orientation",
+                value: norm,
+                allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Names and values of all its numbers.
+    fn components(&self) -> impl Iterator<Item = (&'static str, f64)> {
         const POSITION: [&str; 3] = ["base.position[1]", "base.position[2]", "base.position[3]"];
         const VELOCITY: [&str; 3] = ["base.velocity[1]", "base.velocity[2]", "base.velocity[3]"];
         const ANGULAR: [&str; 3] = ["base.angular_velocity[1]", "base.angular_velocity[2]", "base.angular_velocity[3]"];
@@ -629,21 +723,8 @@ impl Inputs {
             (FORCE, &self.tip_force),
             (MOMENT, &self.tip_moment),
         ];
-        let components = vectors.iter().flat_map(|(names, vector)| names.iter().zip(vector.iter()));
-        for (name, value) in components.chain(ORIENTATION.iter().zip(self.base_orientation.iter())) {
-            if !value.is_finite() {
-                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
-            }
-        }
-        let norm = self.base_orientation.norm();
-        if !(norm > 1e-100 && norm.is_finite()) {
-            return Err(Error::NotAllowed {
-                name: "base.orientation",
-                value: norm,
-                allowed: Allowed::Such("a quaternion other than zero, normalised on use"),
-            });
-        }
-        Ok(())
+        let components = vectors.into_iter().flat_map(|(names, vector)| names.into_iter().zip(vector.iter().copied()));
+        components.chain(ORIENTATION.into_iter().zip(self.base_orientation.iter().copied()))
     }
 
     fn sample(&self) -> Sample {
@@ -664,7 +745,7 @@ impl Unit {
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
         let start = Start { parameters: parameters.clone(), inputs: inputs.clone(), tolerance };
         let mut unit = Self::of(start, Parameters::start)?;
-        unit.read_out(inputs);
+        unit.read_out();
         Ok(unit)
     }
 
@@ -698,6 +779,7 @@ impl Unit {
             gravity: parameters.gravity,
             path,
             warned: false,
+            drive: Drive { boundary, rates: Rates::default() },
             outputs: Outputs::default(),
             start,
         })
@@ -708,7 +790,21 @@ impl Unit {
     /// # Errors
     /// [`Error`]; the unit is then exactly as before and the call may be repeated.
     pub fn advance(&mut self, inputs: &Inputs, step_size: f64) -> Result<Option<Warning>, Error> {
+        self.advance_along(inputs, &Derivatives::default(), step_size)
+    }
+
+    /// The same with inputs that go on by their derivatives.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_along(
+        &mut self,
+        inputs: &Inputs,
+        derivatives: &Derivatives,
+        step_size: f64,
+    ) -> Result<Option<Warning>, Error> {
         inputs.validate()?;
+        derivatives.validate()?;
         if !(step_size > 0.0 && step_size.is_finite()) {
             return Err(Error::NotAllowed {
                 name: "communication step size",
@@ -720,17 +816,16 @@ impl Unit {
             let allowed = Allowed::Such("0 (automatic), or at least a ten-millionth of the communication step");
             return Err(Error::NotAllowed { name: "step", value: step, allowed });
         }
-        let segment = self.path.segment(&inputs.sample(), step_size);
+        let segment = self.path.segment(&inputs.sample(), &derivatives.onward(inputs), step_size);
         let gravity = self.gravity;
+        let force = (inputs.tip_force, derivatives.of(|inputs| inputs.tip_force));
+        let moment = (inputs.tip_moment, derivatives.of(|inputs| inputs.tip_moment));
         let drive = |time: f64| {
             let (jerk, angular_acceleration) = segment.rates(time);
+            let ([tip_force, force_t], [tip_moment, moment_t]) = (at(&force, time), at(&moment, time));
             Drive {
-                boundary: Boundary {
-                    tip_force: inputs.tip_force,
-                    tip_moment: inputs.tip_moment,
-                    ..Boundary::hanging_from(segment.at(time), gravity)
-                },
-                rates: Rates { jerk, angular_acceleration, ..Rates::default() },
+                boundary: Boundary { tip_force, tip_moment, ..Boundary::hanging_from(segment.at(time), gravity) },
+                rates: Rates { jerk, angular_acceleration, tip_force: force_t, tip_moment: moment_t },
             }
         };
         let done = self.integrator.advance(&drive, step_size);
@@ -739,8 +834,9 @@ impl Unit {
             false => Error::Diverged { time, step, cause },
         })?;
         let warning = self.disagreement(&segment, step_size);
+        self.drive = drive(step_size);
         self.path = segment.into_path();
-        self.read_out(inputs);
+        self.read_out();
         Ok(warning)
     }
 
@@ -786,8 +882,8 @@ impl Unit {
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
-    fn read_out(&mut self, inputs: &Inputs) {
-        let (integrator, base) = (&self.integrator, self.path.base());
+    fn read_out(&mut self) {
+        let (integrator, Boundary { base, tip_force, tip_moment, .. }) = (&self.integrator, &self.drive.boundary);
         let Ends { position, rotation, velocity, angular_velocity, force, moment } = integrator.ends();
         self.outputs = Outputs {
             tip_position: position,
@@ -798,7 +894,7 @@ impl Unit {
             base_reaction_moment: moment,
             energy: *integrator.energy(),
             power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
-            power_tip: inputs.tip_force.dot(&velocity) + inputs.tip_moment.dot(&angular_velocity),
+            power_tip: tip_force.dot(&velocity) + tip_moment.dot(&angular_velocity),
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
             ..self.outputs
@@ -808,7 +904,7 @@ impl Unit {
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, gravity, path, warned, outputs } but { start, step, quasi_static });
+archived!(Unit { integrator, gravity, path, warned, drive, outputs } but { start, step, quasi_static });
 
 /// A unit is loaded into the one that is there if that was started alike, else into one that is made for it. It goes on bit
 /// for bit as the one that was saved.

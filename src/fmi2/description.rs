@@ -132,7 +132,7 @@ fn co_simulation(xml: &mut Xml) -> io::Result<()> {
             ("modelIdentifier", MODEL_IDENTIFIER),
             ("needsExecutionTool", "false"),
             ("canHandleVariableCommunicationStepSize", "true"),
-            ("canInterpolateInputs", "false"),
+            ("canInterpolateInputs", "true"),
             ("maxOutputDerivativeOrder", "0"),
             ("canRunAsynchronuously", "false"),
             ("canBeInstantiatedOnlyOncePerProcess", "false"),
