@@ -871,15 +871,12 @@ impl Integrator {
                 self.effort.iterated(report.iterations);
                 let Stepper { mesh, rod, state, .. } = &self.stepper;
                 let before = self.stepper.previous();
+                let begin = drive(time).boundary;
                 let mean = |from: Vec3, to: Vec3| 0.5 * (from + to);
-                // loads that are held over a step, or go steadily
-                let worked = match kind {
-                    Kind::Resting => Boundary {
-                        tip_force: mean(before.boundary.tip_force, boundary.tip_force),
-                        tip_moment: mean(before.boundary.tip_moment, boundary.tip_moment),
-                        ..boundary
-                    },
-                    Kind::Fitting | Kind::Damped | Kind::Falling => boundary,
+                let worked = Boundary {
+                    tip_force: mean(begin.tip_force, boundary.tip_force),
+                    tip_moment: mean(begin.tip_moment, boundary.tip_moment),
+                    ..boundary
                 };
                 let energy = self.energy.after(mesh, rod, before, state, &worked);
                 if kind == Kind::Falling && gain(&self.energy, &energy, self.large) > WILD {
@@ -910,14 +907,15 @@ impl Integrator {
 
     /// An interval from one equilibrium to the next, in which loads and gravity go steadily to what they are to be.
     fn drift(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
-        let from = self.stepper.state.boundary;
+        let (from, begin) = (self.stepper.state.boundary, drive(0.0).boundary);
         let steady = |time: f64| {
             let Drive { boundary: to, rates } = drive(time);
             let share = time / duration;
             let between = |from: Vec3, to: Vec3| if share < 1.0 { from + (to - from) * share } else { to };
+            // what the loads have done since the beginning they do by themselves
             let boundary = Boundary {
-                tip_force: between(from.tip_force, to.tip_force),
-                tip_moment: between(from.tip_moment, to.tip_moment),
+                tip_force: between(from.tip_force + (to.tip_force - begin.tip_force), to.tip_force),
+                tip_moment: between(from.tip_moment + (to.tip_moment - begin.tip_moment), to.tip_moment),
                 gravity: between(from.gravity, to.gravity),
                 ..to
             };
@@ -1250,8 +1248,9 @@ fn differ(before: &Vec3, now: &Vec3) -> bool {
 
 /// Whether work is done on the ends.
 fn acts(drive: &Drive) -> bool {
-    let Boundary { base, tip_force, tip_moment, .. } = &drive.boundary;
-    [base.velocity, base.angular_velocity, *tip_force, *tip_moment].iter().any(|vector| *vector != Vec3::zeros())
+    let Drive { boundary: Boundary { base, tip_force, tip_moment, .. }, rates } = drive;
+    let loads = [*tip_force, *tip_moment, rates.tip_force, rates.tip_moment];
+    [base.velocity, base.angular_velocity].iter().chain(&loads).any(|vector| *vector != Vec3::zeros())
 }
 
 impl Effort {

@@ -11,6 +11,10 @@
 //! last term feeds the distance between the sampled position and the path back over the time T: positions rounded by a
 //! few digits do not shake the acceleration, and a path that missed something returns. Rotations do the same through
 //! exp, in world axes.
+//!
+//! A host that gives derivatives of what it samples ([`Onward`]) says v̇, and perhaps v̈, itself. The path then ends with
+//! v + v̇ H + v̈ H²/2, fed back as before, and v̈ is the slope of its acceleration. A v̈ that is not given is what v + v̇ H of
+//! the last step missed: nothing where the host gives the slopes of a table, and else the path gains an order.
 
 use crate::archive::archived;
 use crate::boundary::Support;
@@ -54,6 +58,56 @@ pub struct Sample {
     pub angular_velocity: Vec3,
 }
 
+/// First and second derivatives by time of what is sampled, world frame, as far as the host gives them; a first one is
+/// there where the second is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Onward {
+    /// Of the position, m/s and m/s².
+    pub position: [Option<Vec3>; 2],
+    /// Angular velocity and acceleration by which the orientation goes on, rad/s and rad/s².
+    pub rotation: [Option<Vec3>; 2],
+    /// Of the velocity, m/s² and m/s³.
+    pub velocity: [Option<Vec3>; 2],
+    /// Of the angular velocity, rad/s² and rad/s³.
+    pub angular_velocity: [Option<Vec3>; 2],
+}
+
+/// What the host says of a velocity, linear or angular, beyond samples: itself, and its derivatives.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    velocity: Vec3,
+    rate: Option<Vec3>,
+    jerk: Option<Vec3>,
+}
+
+impl Told {
+    /// From a sampled velocity and the derivatives of velocity and pose; `None` if there is nothing but samples.
+    fn of(given: Given, sampled: Vec3, by_velocity: [Option<Vec3>; 2], by_pose: [Option<Vec3>; 2]) -> Option<Self> {
+        let [first, second] = by_pose;
+        match (given, by_velocity) {
+            (Given::Pose, _) => first.map(|velocity| Self { velocity, rate: second, jerk: None }),
+            (_, [Some(rate), jerk]) => Some(Self { velocity: sampled, rate: Some(rate), jerk }),
+            (Given::PoseAndTwist, _) => second.map(|rate| Self { velocity: sampled, rate: Some(rate), jerk: None }),
+            (Given::Twist, _) => None,
+        }
+    }
+
+    /// v̇ and v̈ for a step of `step` s, after one of `last_step` s that began with `velocity` and `rate`, which the host had
+    /// told if it `was_told`.
+    fn rates(&self, step: f64, last_step: f64, velocity: Vec3, rate: Vec3, was_told: bool) -> (Vec3, Vec3) {
+        let change = self.velocity - velocity;
+        let zero = Vec3::zeros();
+        match (self.rate, self.jerk) {
+            (Some(rate), Some(jerk)) => (rate, jerk),
+            // what was missed in a short step is not to be made a large one in a long step
+            (Some(now), None) if was_told => (now, (change - rate * last_step) * (2.0 / step.max(last_step).powi(2))),
+            (Some(now), None) => (now, zero),
+            (None, _) if last_step > 0.0 => (change / last_step, zero),
+            (None, _) => (zero, zero),
+        }
+    }
+}
+
 /// A twist, or its rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Twist {
@@ -81,6 +135,8 @@ pub struct Path {
     rate: Twist,
     /// Change of the rate over the last step.
     jerk: Twist,
+    /// Whether the host has told the rate, linear and angular.
+    told: [bool; 2],
     /// Length of the last communication step; 0 before the first.
     last_step: f64,
     samples: u32,
@@ -102,7 +158,7 @@ pub struct Segment {
 
 archived!(Sample { position, rotation, velocity, angular_velocity });
 archived!(Twist { linear, angular });
-archived!(Path { base, last, rate, jerk, last_step, samples } but { given });
+archived!(Path { base, last, rate, jerk, told, last_step, samples } but { given });
 
 impl Sample {
     fn twist(&self) -> Twist {
@@ -122,7 +178,8 @@ impl Path {
             angular_velocity: last.angular_velocity,
             ..Support::at_rest(sample.position, sample.rotation)
         };
-        Self { given, base, last, rate: Twist::default(), jerk: Twist::default(), last_step: 0.0, samples: 0 }
+        let (rate, jerk) = Default::default();
+        Self { given, base, last, rate, jerk, told: [false; 2], last_step: 0.0, samples: 0 }
     }
 
     /// A path that begins with the motion `present` of an end, whatever it did before, and is led to the samples of which
@@ -146,9 +203,9 @@ impl Path {
         self.samples > 0
     }
 
-    /// The path over the next `step` s, from a sample at its start.
-    pub fn segment(&self, sample: &Sample, step: f64) -> Segment {
-        let mut next = self.clone();
+    /// The path over the next `step` s, from a sample at its start, and from what the host says of how it goes on.
+    pub fn segment(&self, sample: &Sample, onward: &Onward, step: f64) -> Segment {
+        let mut next = Self { jerk: Twist::default(), ..self.clone() };
         match self.given {
             Given::Pose => next.track(sample),
             Given::PoseAndTwist | Given::Twist => {
@@ -162,6 +219,7 @@ impl Path {
                 next.last = *sample;
             }
         }
+        next.listen(self, sample, onward, step);
         let mut away = Twist {
             linear: next.last.position - self.base.position,
             angular: so3::log(&(next.last.rotation * self.base.rotation.transpose())),
@@ -171,8 +229,18 @@ impl Path {
         }
         let derived = usize::from(self.given == Given::Pose);
         let feed = 1.0 / FEED_TIME[derived].max(FEED_STEPS[derived] * step);
-        let target = next.last.twist().plus(step, next.rate).plus(feed, away);
+        let mut target = next.last.twist().plus(step, next.rate).plus(feed, away);
         let now = Twist { linear: self.base.velocity, angular: self.base.angular_velocity };
+        if next.told[0] {
+            target.linear += next.jerk.linear * (0.5 * step * step);
+        }
+        if next.told[1] {
+            target.angular += next.jerk.angular * (0.5 * step * step);
+            // of the rotation vector Φ since the start: Φ_t = ω − Φ × ω/2 + …, and at the start Φ_ttt = ω_tt − ω × ω_t/2
+            let turned = (now.angular + target.angular) * (0.5 * step);
+            target.angular -= turned.cross(&target.angular) * 0.5;
+            next.jerk.angular -= next.last.angular_velocity.cross(&next.rate.angular) * 0.5;
+        }
         let mean = target.plus(-1.0, now).map(|change| change / step);
         let acceleration = mean.plus(-0.5 * step, next.jerk);
         next.last_step = step;
@@ -181,6 +249,24 @@ impl Path {
             Segment { start: self.base, acceleration, next, distance: away.linear.norm(), angle: away.angular.norm() };
         segment.next.base = segment.at(step);
         segment
+    }
+
+    /// Takes what the host says of how the sample goes on in place of what the samples `before` tell.
+    fn listen(&mut self, before: &Self, sample: &Sample, onward: &Onward, step: f64) {
+        let linear = Told::of(self.given, sample.velocity, onward.velocity, onward.position);
+        let angular = Told::of(self.given, sample.angular_velocity, onward.angular_velocity, onward.rotation);
+        let (last, last_step) = (&before.last, before.last_step);
+        let rates =
+            |told: &Told, velocity, rate, part: usize| told.rates(step, last_step, velocity, rate, before.told[part]);
+        if let Some(told) = &linear {
+            (self.last.position, self.last.velocity) = (sample.position, told.velocity);
+            (self.rate.linear, self.jerk.linear) = rates(told, last.velocity, before.rate.linear, 0);
+        }
+        if let Some(told) = &angular {
+            (self.last.rotation, self.last.angular_velocity) = (sample.rotation, told.velocity);
+            (self.rate.angular, self.jerk.angular) = rates(told, last.angular_velocity, before.rate.angular, 1);
+        }
+        self.told = [linear, angular].map(|told| told.is_some_and(|told| told.rate.is_some()));
     }
 
     /// Fading-memory fit of a parabola to the poses (the g-h-k filter with equal roots θ): position, twist and its
@@ -286,7 +372,7 @@ mod tests {
         (0..periods * per_period)
             .map(|i| {
                 let t = i as f64 * h;
-                path = path.segment(&sample(x(t), v(t)), h).into_path();
+                path = path.segment(&sample(x(t), v(t)), &Onward::default(), h).into_path();
                 (path.base.acceleration.x, a(t + h), path.base.position.x - x(t + h))
             })
             .collect()
@@ -297,7 +383,7 @@ mod tests {
         let twist = Twist { linear: Vec3::new(1.0, -2.0, 0.5), angular: Vec3::new(0.3, 1.0, -0.4) };
         let mut path = Path::new(Given::Twist, sample(0.1, 0.7));
         path.base.angular_velocity = Vec3::new(0.2, -0.5, 0.9);
-        let mut segment = path.segment(&sample(0.2, 1.1), 0.3);
+        let mut segment = path.segment(&sample(0.2, 1.1), &Onward::default(), 0.3);
         (segment.acceleration, segment.next.jerk) = (twist, twist.map(|x| x.yzx()));
         let (time, step) = (0.2, 1e-5);
         let change =

@@ -11,7 +11,7 @@
 //! which leaves ε⁴ y⁽⁵⁾/30. ε d is a small part of what moves the rod as far as it is long, in the time in which gravity or
 //! stiffness do: so ε⁴ is below the roundings that ε divides.
 
-use crate::unit::{Acting, Error, Inputs, Outputs, Response, Tunable, Unit};
+use crate::unit::{Acting, Derivatives, Error, Inputs, Outputs, Response, Tunable, Unit};
 use nalgebra::{Vector3, Vector4};
 
 /// Part of what moves the rod as far as it is long.
@@ -43,6 +43,7 @@ pub fn nowhere() -> Acting {
             tip_velocity: zero,
             tip_angular_velocity: zero,
         },
+        derivatives: Derivatives::default(),
         tunable: Tunable::default(),
     }
 }
@@ -98,6 +99,7 @@ fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
             tip_velocity: from.tip_velocity + by.tip_velocity * distance,
             tip_angular_velocity: from.tip_angular_velocity + by.tip_angular_velocity * distance,
         },
+        derivatives: acting.derivatives.clone(),
         tunable: Tunable {
             gravity: held.gravity + tuned.gravity * distance,
             damping_bending: held.damping_bending + tuned.damping_bending * distance,
@@ -121,7 +123,7 @@ fn size(direction: &Acting, response: &Response) -> f64 {
     let rate = step / (time * time);
     let turn = |motion: i32| if motion == 1 { (step / time).powi(2) } else { step / time };
     let (base, tip) = (turn(parameters.base_motion), turn(parameters.tip_motion));
-    let (Acting { inputs, tunable }, acting) = (direction, response.acting());
+    let (Acting { inputs, tunable, .. }, acting) = (direction, response.acting());
     [
         inputs.base_position.norm() / (length * base),
         inputs.base_orientation.norm() / (acting.inputs.base_orientation.norm() * base),

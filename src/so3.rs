@@ -428,6 +428,21 @@ pub fn from_quaternion(q: &Vector4<f64>) -> Matrix3<f64> {
     Matrix3::identity() + hat(&v) * (2.0 * q[0]) + hat(&v) * hat(&v) * 2.0
 }
 
+/// Angular velocity and acceleration, in world axes, of the orientation of a quaternion other than zero, normalised on use,
+/// from its first two derivatives by time as far as they are given.
+pub fn turning(q: &Vector4<f64>, [first, second]: [Option<Vector4<f64>>; 2]) -> [Option<Vector3<f64>>; 2] {
+    let per_square = 1.0 / q.norm_squared();
+    let vector = |q: &Vector4<f64>| Vector3::new(q[1], q[2], q[3]);
+    // twice the vector part of q_t q⁻¹
+    let twice = |q_t: &Vector4<f64>| {
+        (vector(q_t) * q[0] - vector(q) * q_t[0] - vector(q_t).cross(&vector(q))) * (2.0 * per_square)
+    };
+    let velocity = first.as_ref().map(twice);
+    let acceleration =
+        first.zip(second).map(|(first, second)| twice(&second) - twice(&first) * (2.0 * per_square * q.dot(&first)));
+    [velocity, acceleration]
+}
+
 /// The unit quaternion (w, x, y, z), w ≥ 0, of a rotation (Shepperd's choice of the largest component).
 pub fn quaternion(rotation: &Matrix3<f64>) -> Vector4<f64> {
     let r = rotation;

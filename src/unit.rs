@@ -10,7 +10,7 @@ use crate::energy::Energy;
 use crate::integrator::{Course, Effort, Ends, Failed, Integrator, Way};
 use crate::mesh::{MAX_STAGES, Mesh};
 use crate::modes::{self, Mode};
-use crate::path::{Given, Path, Sample, Segment};
+use crate::path::{Given, Onward, Path, Sample, Segment};
 use crate::pose::State;
 use crate::refine::Refiner;
 use crate::rest::RestShape;
@@ -18,7 +18,7 @@ use crate::rod::Rod;
 use crate::so3;
 use crate::span;
 use crate::stepper::{Diverged, Stepper};
-use nalgebra::{Matrix3, Vector3, Vector4};
+use nalgebra::{Matrix3, SVector, Vector3, Vector4};
 use std::f64::consts::PI;
 use std::fmt;
 
@@ -235,6 +235,98 @@ impl Default for Inputs {
     }
 }
 
+/// First and second derivatives of the inputs at the beginning of a communication step, in which they are
+/// x + x' t + x'' t²/2; NaN where none is given. In a vector of which any is given, the others count as zero.
+#[derive(Clone, Debug)]
+pub struct Derivatives {
+    /// Of order 1.
+    pub first: Inputs,
+    /// Of order 2.
+    pub second: Inputs,
+}
+
+archived!(Derivatives { first, second });
+
+impl Default for Derivatives {
+    /// None.
+    fn default() -> Self {
+        let (vector, quaternion) = (Vector3::repeat(f64::NAN), Vector4::repeat(f64::NAN));
+        let none = Inputs {
+            base_position: vector,
+            base_orientation: quaternion,
+            base_velocity: vector,
+            base_angular_velocity: vector,
+            tip_force: vector,
+            tip_moment: vector,
+            tip_position: vector,
+            tip_orientation: quaternion,
+            tip_velocity: vector,
+            tip_angular_velocity: vector,
+        };
+        Self { first: none.clone(), second: none }
+    }
+}
+
+/// A vector and its derivatives, as far as any are given.
+type Going<const N: usize> = (SVector<f64, N>, [Option<SVector<f64, N>>; 2]);
+
+impl Derivatives {
+    /// Refuses what is infinite.
+    ///
+    /// # Errors
+    /// [`Error::NotAllowed`] names the first input with such a derivative.
+    pub fn validate(&self) -> Result<(), Error> {
+        let components = |inputs: &Inputs| inputs.components().chain(inputs.tip_components()).collect::<Vec<_>>();
+        match components(&self.first).into_iter().chain(components(&self.second)).find(|(_, value)| value.is_infinite())
+        {
+            Some((name, value)) => {
+                let allowed = Allowed::Such("a finite derivative by time");
+                Err(Error::NotAllowed { name, value, allowed })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn of<const N: usize>(&self, vector: fn(&Inputs) -> SVector<f64, N>) -> [Option<SVector<f64, N>>; 2] {
+        let given = |inputs: &Inputs| {
+            let values = vector(inputs);
+            let zero_for_none = |value: f64| if value.is_nan() { 0.0 } else { value };
+            values.iter().any(|value| !value.is_nan()).then(|| values.map(zero_for_none))
+        };
+        let second = given(&self.second);
+        [given(&self.first).or(second.map(|_| SVector::zeros())), second]
+    }
+
+    /// What the path of the base has to know.
+    fn base_onward(&self, inputs: &Inputs) -> Onward {
+        Onward {
+            position: self.of(|inputs| inputs.base_position),
+            rotation: so3::turning(&inputs.base_orientation, self.of(|inputs| inputs.base_orientation)),
+            velocity: self.of(|inputs| inputs.base_velocity),
+            angular_velocity: self.of(|inputs| inputs.base_angular_velocity),
+        }
+    }
+
+    /// The same of a driven tip.
+    fn tip_onward(&self, inputs: &Inputs) -> Onward {
+        Onward {
+            position: self.of(|inputs| inputs.tip_position),
+            rotation: so3::turning(&inputs.tip_orientation, self.of(|inputs| inputs.tip_orientation)),
+            velocity: self.of(|inputs| inputs.tip_velocity),
+            angular_velocity: self.of(|inputs| inputs.tip_angular_velocity),
+        }
+    }
+}
+
+/// A vector and its rate `time` s after the beginning of the step.
+fn at<const N: usize>((value, [first, second]): &Going<N>, time: f64) -> [SVector<f64, N>; 2] {
+    match (first, second) {
+        (Some(first), Some(second)) => [value + first * time + second * (0.5 * time * time), first + second * time],
+        (Some(first), None) => [value + first * time, *first],
+        (None, _) => [*value, SVector::zeros()],
+    }
+}
+
 /// What the host may read at every communication point, world frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
@@ -260,7 +352,7 @@ pub struct Outputs {
     pub energy: Energy,
     /// Rate of `energy.work_base`: what the base does on the rod, W.
     pub power_base: f64,
-    /// Rate of `energy.work_tip`, under the load of the step that ends here, W.
+    /// Rate of `energy.work_tip`, under the load with which the last step ended, W.
     pub power_tip: f64,
     /// Acceleration of the base at the end of the step, m/s².
     pub base_acceleration: Vector3<f64>,
@@ -585,9 +677,10 @@ struct Segments {
 
 impl Paths {
     /// Over the next `step` s.
-    fn segments(&self, inputs: &Inputs, step: f64) -> Segments {
-        let tip = self.tip.as_ref().map(|tip| tip.segment(&inputs.tip_sample(), step));
-        Segments { base: self.base.segment(&inputs.sample(), step), tip }
+    fn segments(&self, Acting { inputs, derivatives, .. }: &Acting, step: f64) -> Segments {
+        let of_tip = |tip: &Path| tip.segment(&inputs.tip_sample(), &derivatives.tip_onward(inputs), step);
+        let base = self.base.segment(&inputs.sample(), &derivatives.base_onward(inputs), step);
+        Segments { base, tip: self.tip.as_ref().map(of_tip) }
     }
 }
 
@@ -613,10 +706,12 @@ struct Last {
 }
 
 /// What acts on a rod in a communication step.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Acting {
-    /// The inputs.
+    /// The inputs at its beginning.
     pub inputs: Inputs,
+    /// How they go on.
+    pub derivatives: Derivatives,
     /// What else may change.
     pub tunable: Tunable,
 }
@@ -936,6 +1031,14 @@ impl Inputs {
     /// # Errors
     /// [`Error::NotAllowed`] names the first input.
     pub fn validate(&self) -> Result<(), Error> {
+        if let Some((name, value)) = self.components().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::NotAllowed { name, value, allowed: Allowed::Finite });
+        }
+        is_orientation("base.orientation", &self.base_orientation)
+    }
+
+    /// Names and values of all its numbers but those that only a driven tip reads.
+    fn components(&self) -> impl Iterator<Item = (&'static str, f64)> {
         const POSITION: [&str; 3] = ["base.position[1]", "base.position[2]", "base.position[3]"];
         const VELOCITY: [&str; 3] = ["base.velocity[1]", "base.velocity[2]", "base.velocity[3]"];
         const ANGULAR: [&str; 3] = ["base.angular_velocity[1]", "base.angular_velocity[2]", "base.angular_velocity[3]"];
@@ -950,30 +1053,33 @@ impl Inputs {
             (FORCE, &self.tip_force),
             (MOMENT, &self.tip_moment),
         ];
-        let components = vectors.iter().flat_map(|(names, vector)| names.iter().zip(vector.iter()));
-        for (name, value) in components.chain(ORIENTATION.iter().zip(self.base_orientation.iter())) {
-            if !value.is_finite() {
-                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
-            }
-        }
-        is_orientation("base.orientation", &self.base_orientation)
+        let components = vectors.into_iter().flat_map(|(names, vector)| names.into_iter().zip(vector.iter().copied()));
+        components.chain(ORIENTATION.into_iter().zip(self.base_orientation.iter().copied()))
     }
 
     /// The same for those that only a driven tip reads.
     fn validate_tip(&self) -> Result<(), Error> {
+        if let Some((name, value)) = self.tip_components().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::NotAllowed { name, value, allowed: Allowed::Finite });
+        }
+        is_orientation("tip.driven_orientation", &self.tip_orientation)
+    }
+
+    fn tip_components(&self) -> impl Iterator<Item = (&'static str, f64)> {
         const NAMES: [[&str; 3]; 3] = [
             ["tip.driven_position[1]", "tip.driven_position[2]", "tip.driven_position[3]"],
             ["tip.driven_velocity[1]", "tip.driven_velocity[2]", "tip.driven_velocity[3]"],
             ["tip.driven_angular_velocity[1]", "tip.driven_angular_velocity[2]", "tip.driven_angular_velocity[3]"],
         ];
+        const ORIENTATION: [&str; 4] = [
+            "tip.driven_orientation[1]",
+            "tip.driven_orientation[2]",
+            "tip.driven_orientation[3]",
+            "tip.driven_orientation[4]",
+        ];
         let vectors = [&self.tip_position, &self.tip_velocity, &self.tip_angular_velocity];
-        let components = NAMES.iter().flatten().zip(vectors.into_iter().flatten());
-        for (name, value) in components {
-            if !value.is_finite() {
-                return Err(Error::NotAllowed { name, value: *value, allowed: Allowed::Finite });
-            }
-        }
-        is_orientation("tip.driven_orientation", &self.tip_orientation)
+        let components = NAMES.into_iter().flatten().zip(vectors.into_iter().flatten().copied());
+        components.chain(ORIENTATION.into_iter().zip(self.tip_orientation.iter().copied()))
     }
 
     fn tip_sample(&self) -> Sample {
@@ -1023,8 +1129,9 @@ impl Unit {
     /// [`Error`] names the parameter or input that is not allowed, or says why there is no start.
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
         let start = Start { parameters: parameters.clone(), inputs: inputs.clone(), tolerance };
+        let boundary = Acting::held(inputs, parameters.tunable()).at(&start.paths(inputs));
         let mut unit = Self::of(start, Parameters::start)?;
-        unit.read_out(inputs);
+        unit.read_out(&boundary);
         Ok(unit)
     }
 
@@ -1042,7 +1149,7 @@ impl Unit {
             inputs.validate_tip()?;
         }
         let paths = start.paths(inputs);
-        let boundary = Acting { inputs: inputs.clone(), tunable: parameters.tunable() }.at(&paths);
+        let boundary = Acting::held(inputs, parameters.tunable()).at(&paths);
         Ok(Self {
             integrator: begin(parameters, &boundary, tolerance)?,
             step: parameters.longest_step(&parameters.rod(), tolerance),
@@ -1066,7 +1173,21 @@ impl Unit {
     /// # Errors
     /// [`Error`]; the unit is then exactly as before and the call may be repeated.
     pub fn advance(&mut self, inputs: &Inputs, step_size: f64) -> Result<Option<Warning>, Error> {
+        self.advance_along(inputs, &Derivatives::default(), step_size)
+    }
+
+    /// The same with inputs that go on by their derivatives.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_along(
+        &mut self,
+        inputs: &Inputs,
+        derivatives: &Derivatives,
+        step_size: f64,
+    ) -> Result<Option<Warning>, Error> {
         inputs.validate()?;
+        derivatives.validate()?;
         if !(step_size > 0.0 && step_size.is_finite()) {
             return Err(Error::NotAllowed {
                 name: "communication step size",
@@ -1083,7 +1204,7 @@ impl Unit {
             return Err(Error::NotAllowed { name: "step", value: self.step, allowed });
         }
         self.last = None;
-        let acting = Acting { inputs: inputs.clone(), tunable: self.tunable };
+        let acting = Acting { inputs: inputs.clone(), derivatives: derivatives.clone(), tunable: self.tunable };
         let catches = is_driven && !self.driven;
         let tip = match (is_driven, catches) {
             (false, _) => None,
@@ -1091,7 +1212,7 @@ impl Unit {
             (true, true) => Some(self.catch(&inputs.tip_sample())),
         };
         let paths = Paths { base: self.path.clone(), tip };
-        let segments = paths.segments(inputs, step_size);
+        let segments = paths.segments(&acting, step_size);
         if let Err(error) = self.start.parameters.reaches(segments.apart(step_size), 1.0) {
             if catches {
                 self.integrator.restore();
@@ -1106,6 +1227,7 @@ impl Unit {
         let of_base = self.disagreement(BASE, &segments.base, step_size);
         let of_tip = || segments.tip.as_ref().and_then(|tip| self.disagreement(TIP, tip, step_size));
         let warning = of_base.or_else(of_tip);
+        let end = acting.along(&segments)(step_size).boundary;
         let Paths { base, tip } = segments.into_paths();
         self.path = base;
         if let Some(tip) = tip {
@@ -1113,7 +1235,7 @@ impl Unit {
         }
         self.driven = is_driven;
         self.last = Some(Last { paths, acting, duration: step_size });
-        self.read_out(inputs);
+        self.read_out(&end);
         Ok(warning)
     }
 
@@ -1135,7 +1257,7 @@ impl Unit {
             None => None,
             Some(last) => {
                 let Last { paths, acting, duration } = last;
-                let segments = paths.segments(&acting.inputs, *duration);
+                let segments = paths.segments(acting, *duration);
                 let course = self.integrator.course(&acting.along(&segments), *duration);
                 Some((course.map_err(|failed| self.failure(failed, &segments))?, last))
             }
@@ -1206,15 +1328,16 @@ impl Unit {
         modes::modes(self.integrator.in_space(), &boundary, count).map_err(Error::NoEquilibrium)
     }
 
-    fn read_out(&mut self, inputs: &Inputs) {
+    fn read_out(&mut self, end: &Boundary) {
         let masses = self.start.parameters.wants_masses();
-        self.outputs.read(&mut self.integrator, self.path.base(), inputs, masses);
+        self.outputs.read(&mut self.integrator, end, masses);
     }
 }
 
 impl Outputs {
-    /// What is to be read of a rod on this base, after a step with these inputs; its effective mass if `masses` are wanted.
-    fn read(&mut self, integrator: &mut Integrator, base: &Support, inputs: &Inputs, masses: bool) {
+    /// What is to be read of a rod on which this acts at the `end` of a step; its effective mass if `masses` are wanted.
+    fn read(&mut self, integrator: &mut Integrator, end: &Boundary, masses: bool) {
+        let base = &end.base;
         let Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment } =
             integrator.ends();
         *self = Self {
@@ -1228,8 +1351,8 @@ impl Outputs {
             tip_reaction_moment: tip_moment,
             energy: *integrator.energy(),
             power_base: -force.dot(&base.velocity) - moment.dot(&base.angular_velocity),
-            power_tip: (inputs.tip_force - tip_force).dot(&velocity)
-                + (inputs.tip_moment - tip_moment).dot(&angular_velocity),
+            power_tip: (end.tip_force - tip_force).dot(&velocity)
+                + (end.tip_moment - tip_moment).dot(&angular_velocity),
             base_acceleration: base.acceleration,
             cells: integrator.cells() as i32,
             solver: *integrator.effort(),
@@ -1244,26 +1367,38 @@ impl Outputs {
 }
 
 impl Acting {
+    /// Inputs that stay as they are.
+    fn held(inputs: &Inputs, tunable: Tunable) -> Self {
+        Self { inputs: inputs.clone(), derivatives: Derivatives::default(), tunable }
+    }
+
     /// The same as functions of the time since the beginning of the step, on ends that follow these segments.
     fn along<'a>(&'a self, Segments { base, tip }: &'a Segments) -> impl Fn(f64) -> Drive + 'a {
+        let Self { inputs, derivatives, tunable } = self;
+        let force = (inputs.tip_force, derivatives.of(|inputs| inputs.tip_force));
+        let moment = (inputs.tip_moment, derivatives.of(|inputs| inputs.tip_moment));
         move |time| {
             let (jerk, angular_acceleration) = base.rates(time);
-            let rates = Rates { jerk, angular_acceleration, ..Rates::default() };
-            Drive { boundary: self.on(base.at(time), tip.as_ref().map(|tip| tip.at(time))), rates }
+            let ([tip_force, force_t], [tip_moment, moment_t]) = (at(&force, time), at(&moment, time));
+            Drive {
+                boundary: Boundary {
+                    tip: tip.as_ref().map_or(Support::free(), |tip| tip.at(time)),
+                    tip_force,
+                    tip_moment,
+                    ..Boundary::hanging_from(base.at(time), tunable.gravity)
+                },
+                rates: Rates { jerk, angular_acceleration, tip_force: force_t, tip_moment: moment_t },
+            }
         }
     }
 
     /// The same at the beginning of these paths.
     fn at(&self, Paths { base, tip }: &Paths) -> Boundary {
-        self.on(*base.base(), tip.as_ref().map(|tip| *tip.base()))
-    }
-
-    fn on(&self, base: Support, tip: Option<Support>) -> Boundary {
         Boundary {
-            tip: tip.unwrap_or(Support::free()),
+            tip: tip.as_ref().map_or(Support::free(), |tip| *tip.base()),
             tip_force: self.inputs.tip_force,
             tip_moment: self.inputs.tip_moment,
-            ..Boundary::hanging_from(base, self.tunable.gravity)
+            ..Boundary::hanging_from(*base.base(), self.tunable.gravity)
         }
     }
 }
@@ -1273,14 +1408,14 @@ impl Response<'_> {
     pub fn acting(&self) -> Acting {
         match &self.course {
             Some((_, last)) => last.acting.clone(),
-            None => Acting { inputs: self.unit.start.inputs.clone(), tunable: self.unit.start.parameters.tunable() },
+            None => Acting::held(&self.unit.start.inputs, self.unit.start.parameters.tunable()),
         }
     }
 
     /// Whether it would be all in a plane, had this acted.
     pub fn stays_in_plane(&self, acting: &Acting) -> bool {
         self.course.as_ref().is_some_and(|(course, Last { paths, duration, .. })| {
-            course.stays_in_plane(&acting.along(&paths.segments(&acting.inputs, *duration)))
+            course.stays_in_plane(&acting.along(&paths.segments(acting, *duration)))
         })
     }
 
@@ -1292,26 +1427,27 @@ impl Response<'_> {
     pub fn to(&self, acting: &Acting, in_plane: bool) -> Result<Outputs, Error> {
         let Unit { start, outputs, .. } = self.unit;
         let damping = acting.tunable.damped(start.parameters.rod());
-        let (mut rod, paths) = match &self.course {
+        let (mut rod, end) = match &self.course {
             Some((course, Last { paths, duration, acting: held })) => {
-                let segments = paths.segments(&acting.inputs, *duration);
+                let segments = paths.segments(acting, *duration);
                 let other = (acting.tunable != held.tunable).then_some(&damping);
                 let rod = course.under(&acting.along(&segments), other, in_plane);
-                (rod.map_err(|failed| self.unit.failure(failed, &segments))?, segments.into_paths())
+                let rod = rod.map_err(|failed| self.unit.failure(failed, &segments))?;
+                (rod, acting.along(&segments)(*duration).boundary)
             }
             None => {
-                let paths = start.paths(&acting.inputs);
+                let boundary = acting.at(&start.paths(&acting.inputs));
                 let Parameters { start_in_equilibrium, quasi_static, .. } = start.parameters;
                 let mut begin = self.unit.integrator.clone();
                 begin.take_damping(&damping);
                 let time = start.parameters.time(&damping);
-                let rod = begin.restarted(&acting.at(&paths), start_in_equilibrium || quasi_static, time);
-                (rod.map_err(Error::NoStart)?, paths)
+                let rod = begin.restarted(&boundary, start_in_equilibrium || quasi_static, time);
+                (rod.map_err(Error::NoStart)?, boundary)
             }
         };
         let mut outputs = outputs.clone();
         let Outputs { solver, cells, .. } = outputs;
-        outputs.read(&mut rod, paths.base.base(), &acting.inputs, start.parameters.wants_masses());
+        outputs.read(&mut rod, &end, start.parameters.wants_masses());
         Ok(Outputs { solver, cells, ..outputs })
     }
 

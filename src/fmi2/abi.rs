@@ -295,7 +295,6 @@ unsafe fn status<T>(
     unsafe { call(component, function, body) }
 }
 
-const INPUT_DERIVATIVES: &str = "derivatives of inputs are";
 const OUTPUT_DERIVATIVES: &str = "derivatives of outputs are";
 const CANCEL: &str = "asynchronous steps, and so cancelling one, are";
 
@@ -594,12 +593,16 @@ unsafe extern "C" fn fmi2GetDirectionalDerivative(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2SetRealInputDerivatives(
     c: fmi2Component,
-    _vr: *const fmi2ValueReference,
-    _nvr: usize,
-    _order: *const fmi2Integer,
-    _value: *const fmi2Real,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    order: *const fmi2Integer,
+    value: *const fmi2Real,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::SetRealInputDerivatives, INPUT_DERIVATIVES) }
+    let body = |instance: &mut Instance| {
+        let (references, orders) = unsafe { (slice(vr, nvr, "vr")?, slice(order, nvr, "order")?) };
+        instance.set_input_derivatives(references, orders, unsafe { slice(value, nvr, "value")? })
+    };
+    unsafe { call(c, Function::SetRealInputDerivatives, body) }
 }
 
 #[unsafe(no_mangle)]

@@ -141,7 +141,7 @@ fn co_simulation(xml: &mut Xml, identifier: &str) -> io::Result<()> {
             ("modelIdentifier", identifier),
             ("needsExecutionTool", "false"),
             ("canHandleVariableCommunicationStepSize", "true"),
-            ("canInterpolateInputs", "false"),
+            ("canInterpolateInputs", "true"),
             ("maxOutputDerivativeOrder", "0"),
             ("canRunAsynchronuously", "false"),
             ("canBeInstantiatedOnlyOncePerProcess", "false"),

@@ -685,6 +685,20 @@ impl Slave<'_> {
         self.check("fmi2DoStep", status)
     }
 
+    /// `fmi2SetRealInputDerivatives`, all of one order.
+    pub fn set_input_derivatives(
+        &self,
+        references: &[fmi2ValueReference],
+        order: fmi2Integer,
+        values: &[f64],
+    ) -> Result<(), Error> {
+        same(references.len(), values.len())?;
+        let (set, orders) = (self.functions.SetRealInputDerivatives, vec![order; values.len()]);
+        let (component, count) = (self.component, values.len());
+        let status = unsafe { set(component, references.as_ptr(), count, orders.as_ptr(), values.as_ptr()) };
+        self.check("fmi2SetRealInputDerivatives", status)
+    }
+
     /// `fmi2GetFMUstate`, in place of `state` unless that is null.
     pub fn get_state(&self, state: &mut fmi2FMUstate) -> Result<(), Error> {
         self.check("fmi2GetFMUstate", unsafe { (self.functions.GetFMUstate)(self.component, state) })

@@ -11,7 +11,7 @@ use super::variables::{self, Kind, Variable};
 use crate::archive::{self, Archive, Archived, Corrupt, archived};
 use crate::integrator::Effort;
 use crate::sensitivity::{self, Sensitivity};
-use crate::unit::{self, Acting, Allowed, Inputs, Parameters, Unit};
+use crate::unit::{self, Acting, Allowed, Derivatives, Inputs, Parameters, Unit};
 use std::collections::BTreeMap;
 use std::{fmt, mem, ptr};
 
@@ -157,6 +157,15 @@ pub enum Failure {
     NotKnown {
         variable: Variable,
     },
+    NoDerivative {
+        variable: Variable,
+        order: i32,
+    },
+    DerivativeNotAllowed {
+        variable: Variable,
+        order: i32,
+        value: f64,
+    },
     BadArgument {
         argument: &'static str,
         value: f64,
@@ -274,6 +283,12 @@ impl fmt::Display for Failure {
             Self::NotUnknown { variable } => write!(f, "{variable} is not computed: derivatives are those of outputs"),
             Self::NotKnown { variable } => {
                 write!(f, "{variable} has no derivatives: they are those by inputs and tunable parameters")
+            }
+            Self::NoDerivative { variable, order } => {
+                write!(f, "derivative of order {order} of {variable} is not allowed: only orders 1 and 2 of inputs")
+            }
+            Self::DerivativeNotAllowed { variable, order, value } => {
+                write!(f, "derivative of order {order} of {variable} = {value} is not allowed: {}", Allowed::Finite)
             }
             Self::BadArgument { argument, value, allowed } => {
                 write!(f, "{argument} = {value} is not allowed: {allowed}")
@@ -409,6 +424,8 @@ struct Simulation {
     experiment: Experiment,
     parameters: Parameters,
     inputs: Inputs,
+    /// For the step that comes; they lapse with it.
+    derivatives: Derivatives,
     /// Before the first step a set drops it, and a get or the end of the initialisation builds it.
     unit: Option<Box<Unit>>,
     time: f64,
@@ -421,7 +438,7 @@ impl Simulation {
     }
 }
 
-archived!(Simulation { mode, experiment, parameters, inputs, unit, time });
+archived!(Simulation { mode, experiment, parameters, inputs, derivatives, unit, time });
 archived!(Experiment { tolerance, start, stop });
 
 /// An instance that is lost is not saved.
@@ -652,6 +669,25 @@ impl Instance {
         Ok(None)
     }
 
+    /// Says how continuous inputs go on in the step that comes.
+    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Answer {
+        let given = |reference: &u32, order: i32, derivatives: &mut Derivatives, value: f64| {
+            let variable = self.variable(*reference, Kind::Real)?;
+            let place = variable.input_derivative(derivatives, order);
+            *place.ok_or(Failure::NoDerivative { variable, order })? = value;
+            match value.is_finite() {
+                true => Ok(()),
+                false => Err(Failure::DerivativeNotAllowed { variable, order, value }),
+            }
+        };
+        let mut derivatives = self.now.derivatives.clone();
+        for ((reference, order), value) in references.iter().zip(orders).zip(values) {
+            given(reference, *order, &mut derivatives, *value)?;
+        }
+        self.now.derivatives = derivatives;
+        Ok(None)
+    }
+
     /// The unit has no strings, so every reference is of the wrong kind, or of none.
     pub fn no_strings(&self, references: &[u32]) -> Answer {
         references.iter().try_for_each(|&reference| self.variable(reference, Kind::String).map(drop))?;
@@ -672,7 +708,7 @@ impl Instance {
             if variable.is_output() { Ok(variable) } else { Err(Failure::NotUnknown { variable }) }
         });
         let unknown = unknown.collect::<Result<Vec<_>, _>>()?;
-        let Acting { mut inputs, tunable } = sensitivity::nowhere();
+        let Acting { mut inputs, tunable, .. } = sensitivity::nowhere();
         let mut parameters = Parameters::default().tuned(&tunable);
         for (&reference, &part) in known.iter().zip(direction) {
             let variable = self.variable(reference, Kind::Real)?;
@@ -685,7 +721,7 @@ impl Instance {
             let sum = variable.given(&mut parameters, &mut inputs).unwrap_or_default() + part;
             variable.set(&mut parameters, &mut inputs, sum);
         }
-        let direction = Acting { inputs, tunable: parameters.tunable() };
+        let direction = Acting { inputs, tunable: parameters.tunable(), ..sensitivity::nowhere() };
         let sensitivity = Sensitivity::new(self.unit()?, &direction)?;
         for (variable, derivative) in unknown.iter().zip(derivatives) {
             *derivative = sensitivity.of(|outputs| variable.computed(outputs).unwrap_or_default());
@@ -707,14 +743,16 @@ impl Instance {
         if let Some(stop) = self.now.experiment.stop.filter(|stop| end > stop + near) {
             return Err(Failure::PastStopTime { end, stop });
         }
-        let (inputs, tunable) = (self.now.inputs.clone(), self.now.parameters.tunable());
+        let (inputs, derivatives) = (self.now.inputs.clone(), self.now.derivatives.clone());
+        let tunable = self.now.parameters.tunable();
         let own_step = (time - self.now.time) + step_size;
         let unit = self.unit()?;
         let retries = unit.outputs().solver.retries;
         unit.tune(&tunable)?;
-        let warning = unit.advance(&inputs, own_step)?;
+        let warning = unit.advance_along(&inputs, &derivatives, own_step)?;
         let retries = unit.outputs().solver.retries - retries;
         self.now.time = end;
+        self.now.derivatives = Derivatives::default();
         Ok(match warning {
             Some(warning) => Some(Note::Warning(warning)),
             None => (retries > 0).then_some(Note::Repeated { retries, end }),

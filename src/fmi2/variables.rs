@@ -5,7 +5,7 @@
 //! variables, and the value reference of a variable is its place in that list. It is one list for all types, so that a
 //! reference taken for the wrong type is noticed.
 
-use crate::unit::{Allowed, Inputs, Outputs, Parameters, STATIONS};
+use crate::unit::{Allowed, Derivatives, Inputs, Outputs, Parameters, STATIONS};
 use std::fmt;
 
 /// Type of a variable in the sense of FMI.
@@ -214,6 +214,15 @@ impl Variable {
             Slot::BooleanParameter(at) => *at(parameters) = value != 0.0,
             Slot::Input(at) => *at(inputs, self.element) = value,
             Slot::Output(..) | Slot::IntegerOutput(..) | Slot::BooleanOutput(..) => {}
+        }
+    }
+
+    /// Where its derivative of this order is set; `None` if it has none that can be.
+    pub fn input_derivative<'a>(&self, derivatives: &'a mut Derivatives, order: i32) -> Option<&'a mut f64> {
+        match (self.row.slot, order) {
+            (Slot::Input(at), 1) => Some(at(&mut derivatives.first, self.element)),
+            (Slot::Input(at), 2) => Some(at(&mut derivatives.second, self.element)),
+            _ => None,
         }
     }
 }
