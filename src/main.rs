@@ -24,6 +24,12 @@ enum Command {
         /// Where to write the FMU.
         #[arg(short, long, default_value = "target/CosseratRod.fmu")]
         output: PathBuf,
+        /// A library for this platform that was built elsewhere; without it, the one built with this program.
+        #[arg(long, value_name = "LIBRARY", conflicts_with = "merge")]
+        library: Option<PathBuf>,
+        /// FMUs of the same model, built on other platforms: writes one with the libraries of all.
+        #[arg(long, value_name = "FMU", num_args = 1..)]
+        merge: Vec<PathBuf>,
     },
     /// Tells what is in an FMU: model, platforms, capabilities, parameters.
     Info(cli::info::Arguments),
@@ -53,8 +59,12 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
-        Command::Package { output } => {
-            package::package(&output)?;
+        Command::Package { output, library, merge } => {
+            match library {
+                _ if !merge.is_empty() => package::merge(&merge, &output)?,
+                Some(library) => package::package_library(&library, &output)?,
+                None => package::package(&output)?,
+            }
             println!("{}", output.display());
             Ok(())
         }
