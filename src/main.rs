@@ -22,10 +22,17 @@ enum Command {
     /// Packages the library and its description as an FMU.
     Package {
         /// A rod of its own name, shape and start values (TOML, see examples/coil_hose.toml); without it, the unit itself.
+        #[arg(conflicts_with = "merge")]
         rod: Option<PathBuf>,
         /// Where to write the FMU; without it, to target/ under the name of the model.
         #[arg(short, long)]
         output: Option<PathBuf>,
+        /// A library for this platform that was built elsewhere; without it, the one built with this program.
+        #[arg(long, value_name = "LIBRARY", conflicts_with = "merge")]
+        library: Option<PathBuf>,
+        /// FMUs of the same model, built on other platforms: writes one with the libraries of all.
+        #[arg(long, value_name = "FMU", num_args = 1.., requires = "output")]
+        merge: Vec<PathBuf>,
     },
     /// Tells what is in an FMU: model, platforms, capabilities, parameters.
     Info(cli::info::Arguments),
@@ -55,10 +62,14 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> Result<(), Box<dyn Error>> {
     match command {
-        Command::Package { rod, output } => {
+        Command::Package { rod, output, library, merge } => {
             let model = rod.as_deref().map(rod_file::read).transpose()?.unwrap_or_default();
             let output = output.unwrap_or_else(|| Path::new("target").join(format!("{}.fmu", model.name)));
-            package::package(&output, &model)?;
+            match library {
+                _ if !merge.is_empty() => package::merge(&merge, &output)?,
+                Some(library) => package::package_library(&library, &output, &model)?,
+                None => package::package(&output, &model)?,
+            }
             println!("{}", output.display());
             Ok(())
         }

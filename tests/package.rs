@@ -8,10 +8,12 @@ use cosserat_rod::package::{self, documentation, raster, sketch, terminals};
 use quick_xml::Reader;
 use quick_xml::events::Event;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, io};
-use zip::{CompressionMethod, ZipArchive};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// An empty directory of this test.
 fn directory(test: &str) -> PathBuf {
@@ -71,6 +73,9 @@ fn the_archive_is_what_the_standard_asks_for() {
         "documentation/licenses/THIRD-PARTY.txt",
         "terminalsAndIcons/terminalsAndIcons.xml",
         "extra/com.open-simulation-platform/CosseratRod_OspModelDescription.xml",
+        "extra/io.github.cosserat-rod/CosseratRod_in.csv",
+        "extra/io.github.cosserat-rod/CosseratRod_ref.csv",
+        "extra/io.github.cosserat-rod/CosseratRod_ref.opt",
     ];
     assert_eq!(names, expected.map(str::to_owned).into());
     for index in 0..zip.len() {
@@ -87,6 +92,84 @@ fn the_archive_is_what_the_standard_asks_for() {
     }
     let xml = io::read_to_string(zip.by_name("modelDescription.xml").unwrap()).unwrap();
     assert!(xml == description::xml(&Model::default()));
+}
+
+/// A copy of an archive with other names and contents, as `change` gives them.
+fn altered(archive: &Path, to: &Path, change: impl Fn(&str, Vec<u8>) -> (String, Vec<u8>)) {
+    let mut zip = ZipArchive::new(fs::File::open(archive).unwrap()).unwrap();
+    let mut writer = ZipWriter::new(fs::File::create(to).unwrap());
+    for index in 0..zip.len() {
+        let mut file = zip.by_index(index).unwrap();
+        let (name, mut content) = (file.name().unwrap().into_owned(), Vec::new());
+        file.read_to_end(&mut content).unwrap();
+        let (name, content) = change(&name, content);
+        writer.start_file(name, SimpleFileOptions::default()).unwrap();
+        writer.write_all(&content).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// Archives of other platforms, which are made up: merging reads no library.
+#[test]
+fn archives_of_several_platforms_become_one() {
+    let directory = directory("merge");
+    let [here, elsewhere, other, newer] =
+        ["here.fmu", "elsewhere.fmu", "other.fmu", "newer.fmu"].map(|name| directory.join(name));
+    package::package(&here, &Model::default()).unwrap();
+    let binary = description::binary(description::MODEL_IDENTIFIER);
+    let away = "binaries/elsewhere64/CosseratRod.so";
+    altered(&here, &elsewhere, |name, content| match name {
+        name if name == binary => (away.to_owned(), b"a library".to_vec()),
+        // what is not a library is that of the first
+        documentation::INDEX => (name.to_owned(), Vec::new()),
+        _ => (name.to_owned(), content),
+    });
+    assert_eq!(
+        cosserat(&directory, &["package", "--merge", "here.fmu", "elsewhere.fmu", "-o", "all.fmu"]),
+        (true, String::new())
+    );
+    let all = directory.join("all.fmu");
+    let mut expected: BTreeSet<String> = package::names(&here).unwrap().into_iter().collect();
+    expected.insert(away.to_owned());
+    assert_eq!(package::names(&all).unwrap().into_iter().collect::<BTreeSet<_>>(), expected);
+    assert_eq!(package::read(&all, away).unwrap(), "a library");
+    assert_eq!(package::read(&all, documentation::INDEX).unwrap(), documentation::index(&Model::default()));
+    assert!(cosserat(&directory, &["check", "all.fmu"]).0);
+
+    // the same library twice is one, a different one of the same name is an error, and so is another model
+    package::merge(&[here.clone(), all.clone()], &all).unwrap();
+    assert_eq!(package::names(&all).unwrap().len(), expected.len());
+    altered(&elsewhere, &newer, |name, content| {
+        (name.to_owned(), if name == away { b"another".to_vec() } else { content })
+    });
+    let guid = description::guid(&Model::default());
+    altered(&elsewhere, &other, |name, content| {
+        let text = String::from_utf8(content.clone()).unwrap_or_default().replace(&guid, "{another}");
+        (name.to_owned(), if name == description::FILE { text.into_bytes() } else { content })
+    });
+    for (file, expected) in [
+        ("newer.fmu", vec!["newer.fmu", away, "differs"]),
+        ("other.fmu", vec!["other.fmu", "GUID {another}", &guid, "all.fmu"]),
+        ("none.fmu", vec!["none.fmu"]),
+    ] {
+        let (success, error) = cosserat(&directory, &["package", "--merge", "all.fmu", file, "-o", "not.fmu"]);
+        assert!(!success && expected.iter().all(|word| error.contains(word)), "{error}");
+        assert!(!directory.join("not.fmu").exists());
+    }
+}
+
+#[test]
+fn a_library_built_elsewhere_is_packaged_if_it_fits() {
+    let directory = directory("library");
+    fs::copy(package::library().unwrap(), directory.join("built")).unwrap();
+    assert_eq!(cosserat(&directory, &["package", "--library", "built", "-o", "a.fmu"]), (true, String::new()));
+    package::package(&directory.join("b.fmu"), &Model::default()).unwrap();
+    let [a, b] = ["a.fmu", "b.fmu"].map(|name| fs::read(directory.join(name)).unwrap());
+    assert!(a == b);
+    fs::write(directory.join("text"), "no library").unwrap();
+    let (success, error) = cosserat(&directory, &["package", "--library", "text", "-o", "c.fmu"]);
+    assert!(!success && error.contains("the library does not fit"), "{error}");
+    assert!(!directory.join("c.fmu").exists());
 }
 
 #[test]

@@ -6,6 +6,8 @@ pub mod sketch;
 
 pub mod terminals;
 
+pub mod reference;
+
 pub mod documentation;
 
 pub mod centreline;
@@ -14,8 +16,9 @@ pub mod rod_file;
 
 use crate::fmi2::model::{self, Model};
 use crate::fmi2::{description, host};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use crate::unit;
+use std::io::{self, Read, Write};
+use std::path::{self, Path, PathBuf};
 use std::{env, fmt, fs};
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -35,6 +38,33 @@ pub enum Error {
     NoPlace(model::NoPlace),
     /// The icon cannot be drawn.
     Icon(raster::Error),
+    /// The reference results cannot be computed.
+    Reference(unit::Error),
+    /// An archive that is to be merged is of another model, or of another version of it.
+    OtherModel {
+        /// The archive.
+        archive: PathBuf,
+        /// Its GUID.
+        guid: String,
+        /// The archive it was to be merged into.
+        first: PathBuf,
+        /// The GUID of that.
+        expected: String,
+    },
+    /// Two archives that are to be merged have different files of one name.
+    Differs {
+        /// The later archive.
+        archive: PathBuf,
+        /// The file.
+        name: String,
+    },
+    /// The description in an archive cannot be read.
+    Description {
+        /// The archive.
+        archive: PathBuf,
+        /// Why.
+        error: host::Error,
+    },
     /// An archive has no file of this name.
     Missing {
         /// The archive.
@@ -61,6 +91,14 @@ impl fmt::Display for Error {
             Self::Library(error) => write!(f, "the library does not fit this program, build both again: {error}"),
             Self::NoPlace(error) => error.fmt(f),
             Self::Icon(error) => write!(f, "the icon of the archive: {error}"),
+            Self::Reference(error) => write!(f, "the reference results of the archive: {error}"),
+            Self::OtherModel { archive, guid, first, expected } => {
+                write!(f, "{}: GUID {guid} is not allowed: {expected}, that of {}", archive.display(), first.display())
+            }
+            Self::Differs { archive, name } => {
+                write!(f, "{}: {name} differs from the one in an archive before", archive.display())
+            }
+            Self::Description { archive, error } => write!(f, "{}: {error}", archive.display()),
             Self::Missing { archive, name } => write!(f, "{}: no {name} in the archive", archive.display()),
             Self::File { path, error } => write!(f, "{}: {error}", path.display()),
         }
@@ -93,21 +131,31 @@ pub fn library() -> Result<PathBuf, Error> {
     }
 }
 
-/// Writes the archive of a model, and the directories above it where they are missing.
+/// Writes the archive of a model with the library that was built with the running program, and the directories above it
+/// where they are missing.
 ///
 /// # Errors
 /// [`Error`]
 pub fn package(archive: &Path, model: &Model) -> Result<(), Error> {
-    let library = library()?;
-    // A library that was left over from another version answers to another GUID.
-    host::Fmu::from_library(&library)
+    package_library(&library()?, archive, model)
+}
+
+/// Writes the archive with this library, built for the platform of the running program.
+///
+/// # Errors
+/// [`Error`]
+pub fn package_library(library: &Path, archive: &Path, model: &Model) -> Result<(), Error> {
+    // The loader looks for a name without a folder elsewhere. A library that was left over from another version answers
+    // to another GUID.
+    host::Fmu::from_library(&path::absolute(library).map_err(at(library))?)
         .and_then(|fmu| fmu.instantiate("package", false).map(drop))
         .map_err(Error::Library)?;
-    let mut code = fs::read(&library).map_err(at(&library))?;
+    let mut code = fs::read(library).map_err(at(library))?;
     if *model != Model::default() {
         model::write(&mut code, model).map_err(Error::NoPlace)?;
     }
     let (binary, ports) = (description::binary(&model.name), terminals::ports_file(&model.name));
+    let [inputs, results, options] = reference::files(model).map_err(Error::Reference)?;
     let files = [
         (description::FILE, description::xml(model).into_bytes()),
         (sketch::ICON, raster::png(&sketch::svg(), 1).map_err(Error::Icon)?),
@@ -118,8 +166,46 @@ pub fn package(archive: &Path, model: &Model) -> Result<(), Error> {
         ("documentation/licenses/THIRD-PARTY.txt", include_bytes!("../../THIRD-PARTY.txt").to_vec()),
         (terminals::TERMINALS, terminals::terminals().into_bytes()),
         (&ports, terminals::ports().into_bytes()),
+        (&inputs.0, inputs.1.into_bytes()),
+        (&results.0, results.1.into_bytes()),
+        (&options.0, options.1.into_bytes()),
     ];
-    let bytes = zip(&files).map_err(at(archive))?;
+    write(&files, archive)
+}
+
+/// Writes one archive of several of the same model, built on different platforms: the files of the first and the
+/// libraries of all.
+///
+/// # Errors
+/// [`Error::OtherModel`], [`Error::Differs`], [`Error::Description`], [`Error::Missing`], [`Error::File`]
+pub fn merge(archives: &[PathBuf], output: &Path) -> Result<(), Error> {
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut first: Option<(&Path, String)> = None;
+    for archive in archives {
+        let xml = read(archive, description::FILE)?;
+        let described = host::Description::parse(&xml);
+        let guid = described.map_err(|error| Error::Description { archive: archive.clone(), error })?.guid;
+        if let Some((first, expected)) = first.as_ref().filter(|(_, expected)| *expected != guid) {
+            let (first, expected) = (first.to_path_buf(), expected.clone());
+            return Err(Error::OtherModel { archive: archive.clone(), guid, first, expected });
+        }
+        let is_first = first.is_none();
+        first.get_or_insert((archive, guid));
+        for name in names(archive)?.into_iter().filter(|name| is_first || name.starts_with("binaries/")) {
+            let content = bytes(archive, &name)?;
+            match files.iter().find(|(known, _)| *known == name) {
+                Some((_, known)) if *known == content => {}
+                Some(_) => return Err(Error::Differs { archive: archive.clone(), name }),
+                None => files.push((name, content)),
+            }
+        }
+    }
+    write(&files, output)
+}
+
+/// Packs these files, and makes the directories above the archive where they are missing.
+fn write(files: &[(impl AsRef<str>, Vec<u8>)], archive: &Path) -> Result<(), Error> {
+    let bytes = zip(files).map_err(at(archive))?;
     if let Some(directory) = archive.parent() {
         fs::create_dir_all(directory).map_err(at(directory))?;
     }
@@ -128,14 +214,14 @@ pub fn package(archive: &Path, model: &Model) -> Result<(), Error> {
 
 /// Deflated, without 64-bit sizes, so that version 2.0 of the format is enough, which is all the standard allows. Every
 /// file has the same date, so that the same files give the same bytes.
-fn zip(files: &[(&str, Vec<u8>)]) -> io::Result<Vec<u8>> {
+fn zip(files: &[(impl AsRef<str>, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .large_file(false)
         .last_modified_time(zip::DateTime::default());
     let mut writer = ZipWriter::new(io::Cursor::new(Vec::new()));
     for (name, content) in files {
-        writer.start_file(*name, options)?;
+        writer.start_file(name.as_ref(), options)?;
         writer.write_all(content)?;
     }
     Ok(writer.finish()?.into_inner())
@@ -172,9 +258,18 @@ pub fn names(archive: &Path) -> Result<Vec<String>, Error> {
 /// # Errors
 /// [`Error::Missing`], [`Error::File`]
 pub fn read(archive: &Path, name: &str) -> Result<String, Error> {
+    io::read_to_string(&bytes(archive, name)?[..]).map_err(at(&archive.join(name)))
+}
+
+/// A file in an archive.
+fn bytes(archive: &Path, name: &str) -> Result<Vec<u8>, Error> {
     let mut zip = open(archive)?;
     match zip.by_name(name) {
-        Ok(file) => io::read_to_string(file).map_err(at(&archive.join(name))),
+        Ok(mut file) => {
+            let mut content = Vec::new();
+            file.read_to_end(&mut content).map_err(at(&archive.join(name)))?;
+            Ok(content)
+        }
         Err(ZipError::FileNotFound) => Err(Error::Missing { archive: archive.to_owned(), name: name.to_owned() }),
         Err(error) => Err(at(archive)(error.into())),
     }
