@@ -276,9 +276,11 @@ impl Derivatives {
     /// # Errors
     /// [`Error::NotAllowed`] names the first input with such a derivative.
     pub fn validate(&self) -> Result<(), Error> {
-        let components = |inputs: &Inputs| inputs.components().chain(inputs.tip_components()).collect::<Vec<_>>();
-        match components(&self.first).into_iter().chain(components(&self.second)).find(|(_, value)| value.is_infinite())
-        {
+        let infinite = |inputs: &Inputs| {
+            let mut components = inputs.components().chain(inputs.tip_components());
+            components.find(|(_, value)| value.is_infinite())
+        };
+        match infinite(&self.first).or_else(|| infinite(&self.second)) {
             Some((name, value)) => {
                 let allowed = Allowed::Such("a finite derivative by time");
                 Err(Error::NotAllowed { name, value, allowed })
@@ -484,6 +486,8 @@ pub enum Error {
     NoStart(Diverged),
     /// There is no step that the outputs could be differentiated in.
     NoStep,
+    /// The outputs have no derivatives by time before the first step.
+    NoStepYet,
     /// No equilibrium follows the last one: a rod that buckles or snaps is not at rest in between.
     NoEquilibriumNearby {
         /// Time since the start of the communication step, s.
@@ -534,6 +538,7 @@ impl fmt::Display for Error {
                 f,
                 "there is no step to differentiate in: a state was set, or a step has failed, since the last one"
             ),
+            Self::NoStepYet => write!(f, "there was no step yet, over which outputs could have changed"),
             Self::NoEquilibriumNearby { time, cause } => write!(
                 f,
                 "quasi_static: no static equilibrium follows the one at {time:.6} s after the communication point, as \
@@ -657,6 +662,8 @@ pub struct Unit {
     /// Of the base, and of the tip.
     warned: [bool; 2],
     outputs: Outputs,
+    /// The outputs at the start of the last communication step, and its length, s; 0 before the first.
+    before: (Outputs, f64),
     /// The last communication step, as long as the integrator knows where it began.
     last: Option<Last>,
 }
@@ -1162,6 +1169,7 @@ impl Unit {
             driven,
             warned: [false; 2],
             outputs: Outputs::default(),
+            before: Default::default(),
             last: None,
             start,
         })
@@ -1235,6 +1243,7 @@ impl Unit {
         }
         self.driven = is_driven;
         self.last = Some(Last { paths, acting, duration: step_size });
+        self.before = (self.outputs.clone(), step_size);
         self.read_out(&end);
         Ok(warning)
     }
@@ -1313,6 +1322,29 @@ impl Unit {
         &self.outputs
     }
 
+    /// The derivatives of the outputs by time, in their places: exact where they are known from other outputs, else the
+    /// differences over the last communication step, right in its middle. Whatever counts is left out.
+    ///
+    /// # Errors
+    /// [`Error::NoStepYet`] before the first step.
+    pub fn rates(&self) -> Result<Outputs, Error> {
+        let (before, lasted) = &self.before;
+        if *lasted == 0.0 {
+            return Err(Error::NoStepYet);
+        }
+        let now = &self.outputs;
+        let mut rates = now.differences(before, *lasted);
+        rates.tip_position = now.tip_velocity;
+        let (w, q) = (now.tip_angular_velocity, now.tip_orientation);
+        let v = q.fixed_rows::<3>(1).into_owned();
+        let turned = (w * q[0] + w.cross(&v)) * 0.5;
+        rates.tip_orientation = Vector4::new(-0.5 * w.dot(&v), turned.x, turned.y, turned.z);
+        rates.stations[0] = self.path.base().velocity;
+        rates.stations[STATIONS - 1] = now.tip_velocity;
+        (rates.energy.work_base, rates.energy.work_tip) = (now.power_base, now.power_tip);
+        Ok(rates)
+    }
+
     /// The rod itself, in space.
     pub fn stepper(&mut self) -> &Stepper {
         self.integrator.in_space()
@@ -1335,6 +1367,37 @@ impl Unit {
 }
 
 impl Outputs {
+    /// What has changed since `before`, per s.
+    fn differences(&self, before: &Self, time: f64) -> Self {
+        let vector = |of: fn(&Self) -> Vector3<f64>| (of(self) - of(before)) / time;
+        let number = |of: fn(&Self) -> f64| (of(self) - of(before)) / time;
+        Self {
+            tip_position: vector(|o| o.tip_position),
+            tip_orientation: (self.tip_orientation - before.tip_orientation) / time,
+            tip_velocity: vector(|o| o.tip_velocity),
+            tip_angular_velocity: vector(|o| o.tip_angular_velocity),
+            base_reaction_force: vector(|o| o.base_reaction_force),
+            base_reaction_moment: vector(|o| o.base_reaction_moment),
+            tip_reaction_force: vector(|o| o.tip_reaction_force),
+            tip_reaction_moment: vector(|o| o.tip_reaction_moment),
+            stations: std::array::from_fn(|i| (self.stations[i] - before.stations[i]) / time),
+            energy: Energy {
+                kinetic: number(|o| o.energy.kinetic),
+                elastic: number(|o| o.energy.elastic),
+                gravity: number(|o| o.energy.gravity),
+                dissipated: number(|o| o.energy.dissipated),
+                work_base: number(|o| o.energy.work_base),
+                work_tip: number(|o| o.energy.work_tip),
+            },
+            power_base: number(|o| o.power_base),
+            power_tip: number(|o| o.power_tip),
+            base_acceleration: vector(|o| o.base_acceleration),
+            effective_mass: (self.effective_mass - before.effective_mass) / time,
+            cells: 0,
+            solver: Effort::default(),
+        }
+    }
+
     /// What is to be read of a rod on which this acts at the `end` of a step; its effective mass if `masses` are wanted.
     fn read(&mut self, integrator: &mut Integrator, end: &Boundary, masses: bool) {
         let base = &end.base;
@@ -1463,7 +1526,7 @@ impl Response<'_> {
 }
 
 // of a unit that was started alike
-archived!(Unit { integrator, tunable, path, tip_path, driven, warned, outputs } but {
+archived!(Unit { integrator, tunable, path, tip_path, driven, warned, outputs, before } but {
     start, step, steps_equally, longest_cell, quasi_static, last
 });
 

@@ -72,7 +72,7 @@ fn simulate_runs_the_default_experiment() {
     let times = column(&table, "time");
     assert_eq!(times.len(), 1 + (STOP_TIME / STEP_SIZE).round() as usize);
     assert_eq!((times[0], times[times.len() - 1]), (0.0, STOP_TIME));
-    assert_eq!(table.len(), 1 + 13 + 6 + 33 + 6 + 14 + 8);
+    assert_eq!(table.len(), 1 + 13 + 12 + 33 + 6 + 14 + 8);
     assert!(table.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())));
     let height = column(&table, "tip.position[3]");
     assert!(height[0].abs() < 1e-12 && height[height.len() - 1] < -0.3);
@@ -394,7 +394,7 @@ fn info_tells_what_is_in_the_archive() {
     let able = "canGetAndSetFMUstate, canHandleVariableCommunicationStepSize";
     let version = format!("cosserat-rod {}", env!("CARGO_PKG_VERSION"));
     let guid = guid(&Model::default());
-    for words in ["CosseratRod", "2.0", &guid, &version, &platform, able, "19 inputs", "documentation/index.html"] {
+    for words in ["CosseratRod", "2.0", &guid, &version, &platform, able, "32 inputs", "documentation/index.html"] {
         assert!(text.contains(words), "{words}: {text}");
     }
     let row = |name: &str| -> Vec<String> {

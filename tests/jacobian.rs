@@ -473,7 +473,6 @@ fn case(random: &mut Random, switches: &Switches) -> Case {
             travel: random.motion(3.0),
             kappa: random.vector(3.0),
             strain: random.motion(3.0),
-            ..Memory::default()
         };
     }
     let mut boundary = Boundary {

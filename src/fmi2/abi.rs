@@ -295,7 +295,6 @@ unsafe fn status<T>(
     unsafe { call(component, function, body) }
 }
 
-const OUTPUT_DERIVATIVES: &str = "derivatives of outputs are";
 const CANCEL: &str = "asynchronous steps, and so cancelling one, are";
 
 #[unsafe(no_mangle)]
@@ -608,12 +607,16 @@ unsafe extern "C" fn fmi2SetRealInputDerivatives(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     c: fmi2Component,
-    _vr: *const fmi2ValueReference,
-    _nvr: usize,
-    _order: *const fmi2Integer,
-    _value: *mut fmi2Real,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    order: *const fmi2Integer,
+    value: *mut fmi2Real,
 ) -> fmi2Status {
-    unsafe { not_supported(c, Function::GetRealOutputDerivatives, OUTPUT_DERIVATIVES) }
+    let body = |instance: &mut Instance| {
+        let (references, orders) = unsafe { (slice(vr, nvr, "vr")?, slice(order, nvr, "order")?) };
+        instance.output_derivatives(references, orders, unsafe { slice_mut(value, nvr, "value")? })
+    };
+    unsafe { call(c, Function::GetRealOutputDerivatives, body) }
 }
 
 /// States are kept as long as the host does not free them, whatever the last argument says of going back to them.

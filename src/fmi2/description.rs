@@ -142,7 +142,7 @@ fn co_simulation(xml: &mut Xml, identifier: &str) -> io::Result<()> {
             ("needsExecutionTool", "false"),
             ("canHandleVariableCommunicationStepSize", "true"),
             ("canInterpolateInputs", "true"),
-            ("maxOutputDerivativeOrder", "0"),
+            ("maxOutputDerivativeOrder", "1"),
             ("canRunAsynchronuously", "false"),
             ("canBeInstantiatedOnlyOncePerProcess", "false"),
             ("canNotUseMemoryManagementFunctions", "true"),

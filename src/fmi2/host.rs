@@ -754,6 +754,16 @@ impl Slave<'_> {
         Ok(derivatives)
     }
 
+    /// `fmi2GetRealOutputDerivatives`, of order 1.
+    pub fn output_derivatives(&self, references: &[fmi2ValueReference]) -> Result<Vec<f64>, Error> {
+        let (count, orders) = (references.len(), vec![1; references.len()]);
+        let mut rates = vec![f64::NAN; count];
+        let get = self.functions.GetRealOutputDerivatives;
+        let status = unsafe { get(self.component, references.as_ptr(), count, orders.as_ptr(), rates.as_mut_ptr()) };
+        self.check("fmi2GetRealOutputDerivatives", status)?;
+        Ok(rates)
+    }
+
     /// `fmi2GetReal`
     pub fn get_real(&self, references: &[fmi2ValueReference], values: &mut [f64]) -> Result<(), Error> {
         self.read("fmi2GetReal", self.functions.GetReal, references, values)

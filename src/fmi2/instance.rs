@@ -161,6 +161,10 @@ pub enum Failure {
         variable: Variable,
         order: i32,
     },
+    NoOutputDerivative {
+        variable: Variable,
+        order: i32,
+    },
     DerivativeNotAllowed {
         variable: Variable,
         order: i32,
@@ -286,6 +290,9 @@ impl fmt::Display for Failure {
             }
             Self::NoDerivative { variable, order } => {
                 write!(f, "derivative of order {order} of {variable} is not allowed: only orders 1 and 2 of inputs")
+            }
+            Self::NoOutputDerivative { variable, order } => {
+                write!(f, "derivative of order {order} of {variable} is not known: only order 1 of outputs")
             }
             Self::DerivativeNotAllowed { variable, order, value } => {
                 write!(f, "derivative of order {order} of {variable} = {value} is not allowed: {}", Allowed::Finite)
@@ -685,6 +692,21 @@ impl Instance {
             given(reference, *order, &mut derivatives, *value)?;
         }
         self.now.derivatives = derivatives;
+        Ok(None)
+    }
+
+    /// How continuous outputs change with time.
+    pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Answer {
+        for (&reference, &order) in references.iter().zip(orders) {
+            let variable = self.variable(reference, Kind::Real)?;
+            if order != 1 || !variable.is_output() {
+                return Err(Failure::NoOutputDerivative { variable, order });
+            }
+        }
+        let rates = if references.is_empty() { Default::default() } else { self.unit()?.rates()? };
+        for (&reference, value) in references.iter().zip(values) {
+            *value = self.variable(reference, Kind::Real)?.computed(&rates).unwrap_or_default();
+        }
         Ok(None)
     }
 
