@@ -103,12 +103,12 @@ def main():
     figure.colorbar(plt.cm.ScalarMappable(plt.Normalize(1.8, 6.0), colours), ax=left, label="time, s", shrink=0.8)
     right.axvspan(2.0, 3.5, color="0.9", label="gust")
     right.plot(times, positions[:, 0], color="tab:blue", label="drone, x, m")
-    right.plot(times, shapes[:, -1, 0], color="tab:green", label="load, x, m")
+    right.plot(times, shapes[:, -1, 0], color="tab:green", linestyle="--", label="load, x, m")
     right.plot(times, pull / 10.0, color="tab:orange", label="pull of the tether, 10 N")
     right.plot(plain[0], np.clip(plain[1][:, 2], -2, 2), color="tab:red", linestyle=":",
                label="drone, z, m, without the added mass")
-    right.set(xlabel="time, s", ylim=(-2, 2))
-    right.legend(fontsize=8, loc="lower right")
+    right.set(xlabel="time, s", ylim=(-2.6, 2))
+    right.legend(fontsize=8, loc="lower left", framealpha=0.9)
     figure.savefig(out / "drone.png", dpi=80)
 
 
