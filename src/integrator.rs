@@ -624,6 +624,9 @@ impl Integrator {
         planar.plane.look(1.0, &begin);
         // what pulls the rod may be other than before
         self.energy = self.energy.now(&planar.plane.energy());
+        if self.effort.steps > 0 {
+            self.adapt_in_plane(&mut planar, &begin);
+        }
         let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
         let (mut time, mut refuses) = (0.0, true);
         while time < duration && self.in_plane {
@@ -643,16 +646,8 @@ impl Integrator {
                 }
             }
             let due = watched && planar.is_due(dt);
-            let joins = self.moves();
-            if let Some((refiner, _)) = &mut self.refiners {
-                // cells that cannot be started stay as they were
-                let changed = refiner.adapt_plane(&mut planar.plane, &at(dt), joins) == Ok(true);
-                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
-                if changed {
-                    planar.disturbance.go_on(&planar.plane);
-                    self.energy = self.energy.now(&planar.plane.energy());
-                    self.note_cells();
-                }
+            if !last {
+                self.adapt_in_plane(&mut planar, &at(dt));
             }
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
@@ -664,6 +659,36 @@ impl Integrator {
         }
         self.planar = Some(planar);
         time
+    }
+
+    /// Changes the cells of a rod in a plane, if it is time to. Not at the end of an interval but at the beginning of the
+    /// next, when they have a step to settle in: the reaction of new ones, by what they leave of the moments, is off by
+    /// several percent at first.
+    fn adapt_in_plane(&mut self, planar: &mut Planar, now: &Drive) {
+        let joins = self.moves();
+        if let Some((refiner, _)) = &mut self.refiners {
+            // cells that cannot be started stay as they were
+            let changed = refiner.adapt_plane(&mut planar.plane, now, joins) == Ok(true);
+            self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+            if changed {
+                planar.disturbance.go_on(&planar.plane);
+                self.energy = self.energy.now(&planar.plane.energy());
+                self.note_cells();
+            }
+        }
+    }
+
+    /// The same in space.
+    fn adapt_in_space(&mut self, now: &Boundary) {
+        let joins = self.moves();
+        if let Some((refiner, _)) = &mut self.refiners {
+            let changed = refiner.adapt(&mut self.stepper, now, joins) == Ok(true);
+            self.effort.space_error = self.effort.space_error.max(refiner.estimated());
+            if changed {
+                self.see_energy(&now.gravity);
+                self.note_cells();
+            }
+        }
     }
 
     /// Takes a step of `dt` s in the plane, if its error, its energy and, if it `refuses`, its cells are good enough. `drive`
@@ -716,6 +741,9 @@ impl Integrator {
     /// Follows in space from `time` on, as long as the error allows; steps of generalized-α take over where they would be
     /// too many.
     fn follow_in_space(&mut self, drive: &impl Fn(f64) -> Drive, mut time: f64, duration: f64) -> Result<(), Failed> {
+        if time == 0.0 && self.effort.steps > 0 {
+            self.adapt_in_space(&drive(0.0).boundary);
+        }
         let shortest = self.pace.shortest.max(duration / MAX_CHOSEN_STEPS);
         let mut refuses = true;
         while time < duration {
@@ -750,15 +778,8 @@ impl Integrator {
                 }
             }
             time = if dt == rest { duration } else { time + dt };
-            let (now, joins) = (drive(time).boundary, self.moves());
-            if let Some((refiner, _)) = &mut self.refiners {
-                // cells that cannot be started stay as they were
-                let changed = refiner.adapt(&mut self.stepper, &now, joins) == Ok(true);
-                self.effort.space_error = self.effort.space_error.max(refiner.estimated());
-                if changed {
-                    self.see_energy(&now.gravity);
-                    self.note_cells();
-                }
+            if time < duration {
+                self.adapt_in_space(&drive(time).boundary);
             }
         }
         Ok(())
