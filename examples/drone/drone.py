@@ -1,4 +1,4 @@
-"""A drone with a load on a tether, in a gust. The drone weighs three times what hangs from it.
+"""A drone with a load on a tether, in a gust. The drone weighs not three times what hangs from it.
 
 Values passed to and fro would not hold at this ratio. The master takes the tether's effective mass to that of the drone
 (`effective_mass`, see examples/coupling), and needs neither to go back nor to iterate.
@@ -16,7 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 STEP, END = 0.005, 12.0  # s
-DRONE, GRAVITY = 2.4, np.array([0.0, 0.0, -9.81])  # kg, m/s²
+DRONE, GRAVITY = 2.0, np.array([0.0, 0.0, -9.81])  # kg, m/s²
 TETHER = {"length": 4.0, "radius": 0.004, "density": 1200.0, "youngs_modulus": 5e7, "shear_modulus": 1.7e7,
           "damping.drag": 0.02, "tip.mass": 0.5, "base.orientation[1]": 0.0, "base.orientation[2]": 1.0,
           "base.orientation[3]": 0.0}
@@ -86,10 +86,12 @@ def main():
     unit = extract(fmu, unzipdir=out / "unit"), read_model_description(fmu)
     plain = fly(unit, adds=False)
     times, positions, reactions, shapes = fly(unit, adds=True)
+    false = np.linalg.norm(plain[2], axis=1)
     away, pull = np.linalg.norm(positions, axis=1), np.linalg.norm(reactions, axis=1)
     print(f"drone {DRONE:.2f} kg, tether and load {HANGS:.2f} kg; the gust drives it {away.max():.2f} m away, the tether pulls "
-          f"with up to {pull.max():.1f} N; without the added mass it is lost after {plain[0][-1]:.2f} s")
+          f"with up to {pull.max():.1f} N; without the added mass it would with {false.max():.0f} N")
     assert times[-1] > END - STEP and away[-1] < 0.2, "it comes back"
+    assert pull.max() < 1.3 * 9.81 * HANGS < 0.1 * false.max(), "what the added mass is for"
     assert abs(reactions[times > 8.0, 2].mean() + 9.81 * HANGS) < 0.02 * 9.81 * HANGS, "it carries the load"
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), layout="constrained", width_ratios=(1, 1.4))
@@ -105,8 +107,8 @@ def main():
     right.plot(times, positions[:, 0], color="tab:blue", label="drone, x, m")
     right.plot(times, shapes[:, -1, 0], color="tab:green", linestyle="--", label="load, x, m")
     right.plot(times, pull / 10.0, color="tab:orange", label="pull of the tether, 10 N")
-    right.plot(plain[0], np.clip(plain[1][:, 2], -2, 2), color="tab:red", linestyle=":",
-               label="drone, z, m, without the added mass")
+    right.plot(plain[0], np.clip(false / 10.0, 0, 2), color="tab:red", linestyle=":", linewidth=1, zorder=0,
+               label="the same without the added mass, up to 20 N")
     right.set(xlabel="time, s", ylim=(-2.6, 2))
     right.legend(fontsize=8, loc="lower left", framealpha=0.9)
     figure.savefig(out / "drone.png", dpi=80)
