@@ -494,9 +494,7 @@ impl Integrator {
     }
 
     fn leave_plane(&mut self) {
-        if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
-            write(plane, &mut self.stepper);
-        }
+        self.in_space();
         self.in_plane = false;
     }
 

@@ -16,13 +16,13 @@ use nalgebra::{Vector3, Vector4};
 
 /// Part of what moves the rod as far as it is long.
 const SMALL: f64 = 1e-3;
-/// Weights of the passes through the step, and where they are.
-const STENCIL: [(f64, f64); 4] = [(-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0)];
+/// Where the passes through the step are, over ε.
+const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 
 /// The outputs in the neighbourhood of the present ones, along a direction.
 #[derive(Clone, Debug)]
 pub struct Sensitivity {
-    near: [Outputs; STENCIL.len()],
+    near: [Outputs; PLACES.len()],
     /// ε.
     distance: f64,
 }
@@ -57,13 +57,13 @@ impl Sensitivity {
     pub fn new(unit: &Unit, direction: &Acting) -> Result<Self, Error> {
         let response = unit.response()?;
         let acting = response.acting();
-        let most = size(direction, &response);
+        let most = size(direction, &acting, &response);
         let distance = if most > 0.0 { SMALL / most } else { 1.0 };
         // far enough along the direction to see whether it leads out of a plane
         let in_plane = response.stays_in_plane(&moved(&acting, distance / SMALL, direction));
         let turned = unit.outputs().tip_orientation;
-        let mut near: [Outputs; STENCIL.len()] = Default::default();
-        for (outputs, (place, _)) in near.iter_mut().zip(STENCIL) {
+        let mut near: [Outputs; PLACES.len()] = Default::default();
+        for (outputs, place) in near.iter_mut().zip(PLACES) {
             *outputs = response.to(&moved(&acting, place * distance, direction), in_plane)?;
             // a quaternion and its negative are the same rotation
             if outputs.tip_orientation.dot(&turned) < 0.0 {
@@ -77,8 +77,7 @@ impl Sensitivity {
     pub fn of(&self, output: impl Fn(&Outputs) -> f64) -> f64 {
         // in pairs, so that what does not change has a derivative of zero
         let [far_below, below, above, far_above] = [0, 1, 2, 3].map(|k| output(&self.near[k]));
-        let [(_, far), (_, near), ..] = STENCIL;
-        (far * (far_below - far_above) + near * (below - above)) / self.distance
+        (8.0 * (above - below) - (far_above - far_below)) / (12.0 * self.distance)
     }
 }
 
@@ -110,20 +109,20 @@ fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
     }
 }
 
-/// How many times `direction` moves the rod as far as it is long, in the time in which gravity or stiffness do. The ends
+/// How many times `direction`, from what is `acting`, moves the rod as far as it is long, in the time in which gravity or stiffness do. The ends
 /// get to their velocity, and to a position that its velocity is derived of, within the step.
-fn size(direction: &Acting, response: &Response) -> f64 {
+fn size(direction: &Acting, acting: &Acting, response: &Response) -> f64 {
     let parameters = response.parameters();
     let (rod, length) = (parameters.rod(), parameters.length);
     let time = parameters.time(&rod);
     let step = response.duration().map_or(time, |duration| duration.min(time));
     let mass = rod.mass_per_length * length + rod.tip_mass;
-    let weight = mass * response.acting().tunable.gravity.norm();
+    let weight = mass * acting.tunable.gravity.norm();
     let force = weight.max(rod.stiffness.max() / (length * length));
     let rate = step / (time * time);
     let turn = |motion: i32| if motion == 1 { (step / time).powi(2) } else { step / time };
     let (base, tip) = (turn(parameters.base_motion), turn(parameters.tip_motion));
-    let (Acting { inputs, tunable, .. }, acting) = (direction, response.acting());
+    let Acting { inputs, tunable, .. } = direction;
     [
         inputs.base_position.norm() / (length * base),
         inputs.base_orientation.norm() / (acting.inputs.base_orientation.norm() * base),

@@ -72,7 +72,8 @@ fn pulls(stepper: &Stepper, boundary: &Boundary) -> [Vec3; 6] {
 }
 
 /// Sets the velocities of the rod in equilibrium under `boundary` to those of its equilibria as both ends move, where they
-/// do not move as one rigid body; whether they do not. `time` is the shortest one in which gravity or stiffness move the whole rod, s.
+/// do not move as one rigid body; whether they do not. `time` is the shortest one in which gravity or stiffness move the
+/// whole rod, s.
 ///
 /// # Errors
 /// [`Diverged`] if there is no equilibrium as near as that; the state is as before.

@@ -178,16 +178,16 @@ impl Unit {
     /// [`Error`] names the parameter or input that is not allowed, or says why there is no start.
     pub fn new(parameters: &Parameters, inputs: &Inputs, tolerance: Option<f64>) -> Result<Self, Error> {
         let start = Start { parameters: parameters.clone(), inputs: inputs.clone(), tolerance };
-        let boundary = Acting::held(inputs, parameters.tunable()).at(&start.paths(inputs));
-        let mut unit = Self::of(start, Parameters::start)?;
+        let (mut unit, boundary) = Self::of(start, Parameters::start)?;
         unit.read_out(&boundary);
         Ok(unit)
     }
 
+    /// A unit of what `begin` makes, and what acts on it then.
     fn of(
         start: Start,
         begin: impl Fn(&Parameters, &Boundary, f64) -> Result<Integrator, Error>,
-    ) -> Result<Self, Error> {
+    ) -> Result<(Self, Boundary), Error> {
         let Start { parameters, inputs, tolerance } = &start;
         parameters.validate()?;
         inputs.validate()?;
@@ -199,7 +199,7 @@ impl Unit {
         }
         let paths = start.paths(inputs);
         let boundary = Acting::held(inputs, parameters.tunable()).at(&paths);
-        Ok(Self {
+        let unit = Self {
             integrator: begin(parameters, &boundary, tolerance)?,
             step: parameters.longest_step(&parameters.rod(), tolerance),
             steps_equally: parameters.step > 0.0 || parameters.extensible,
@@ -214,7 +214,8 @@ impl Unit {
             before: Default::default(),
             last: None,
             start,
-        })
+        };
+        Ok((unit, boundary))
     }
 
     /// Advances by one communication step of `step_size` s, from the inputs at its start. A tip that was free and is to be
@@ -465,7 +466,8 @@ impl Archived for Option<Box<Unit>> {
         let alike = |unit: &mut Box<Unit>| archive::are_same(&mut unit.start, &mut start);
         if archive.is_loading() && !self.as_mut().is_some_and(alike) {
             let room = Unit::of(start, Parameters::room);
-            *self = Some(Box::new(room.map_err(|error| Corrupt::Refused { why: error.to_string() })?));
+            let (unit, _) = room.map_err(|error| Corrupt::Refused { why: error.to_string() })?;
+            *self = Some(Box::new(unit));
         }
         let Some(unit) = self.as_deref_mut() else { return Ok(()) };
         unit.visit(archive)?;

@@ -39,7 +39,8 @@ pub struct Outputs {
     pub power_tip: f64,
     /// Acceleration of the base at the end of the step, m/s².
     pub base_acceleration: Vector3<f64>,
-    /// How much of the rod the base feels at once ([`crate::stepper::Stepper::effective_mass`]), kg; zero where it is not asked for.
+    /// How much of the rod the base feels at once ([`crate::stepper::Stepper::effective_mass`]), kg; zero where it is not
+    /// asked for.
     pub effective_mass: Matrix3<f64>,
     /// Cells in use.
     pub cells: i32,
