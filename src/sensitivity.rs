@@ -123,22 +123,27 @@ fn size(direction: &Acting, acting: &Acting, response: &Response) -> f64 {
     let turn = |motion: i32| if motion == 1 { (step / time).powi(2) } else { step / time };
     let (base, tip) = (turn(parameters.base_motion), turn(parameters.tip_motion));
     let Acting { inputs, tunable, .. } = direction;
-    [
+    // a free tip reads none of these, and they may be anything, an orientation of zero among them
+    let of_tip = match acting.tunable.tip_mode {
+        0 => [0.0; 4],
+        _ => [
+            inputs.tip_position.norm() / (length * tip),
+            inputs.tip_orientation.norm() / (acting.inputs.tip_orientation.norm() * tip),
+            inputs.tip_velocity.norm() / (length * rate),
+            inputs.tip_angular_velocity.norm() / rate,
+        ],
+    };
+    let of_others = [
         inputs.base_position.norm() / (length * base),
         inputs.base_orientation.norm() / (acting.inputs.base_orientation.norm() * base),
         inputs.base_velocity.norm() / (length * rate),
         inputs.base_angular_velocity.norm() / rate,
-        inputs.tip_position.norm() / (length * tip),
-        inputs.tip_orientation.norm() / (acting.inputs.tip_orientation.norm() * tip),
-        inputs.tip_velocity.norm() / (length * rate),
-        inputs.tip_angular_velocity.norm() / rate,
         inputs.tip_force.norm() / force,
         inputs.tip_moment.norm() * length / rod.stiffness.min(),
         tunable.gravity.norm() * time * time / length,
         tunable.damping_bending / time,
         tunable.damping_twist / time,
         tunable.damping_drag * length * time / mass,
-    ]
-    .into_iter()
-    .fold(0.0, |most, size| f64::max(most, size.abs()))
+    ];
+    of_others.into_iter().chain(of_tip).fold(0.0, |most, size| f64::max(most, size.abs()))
 }

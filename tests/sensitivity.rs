@@ -210,6 +210,26 @@ fn what_is_not_used_has_no_effect_at_all() {
 }
 
 #[test]
+fn a_free_tip_does_not_feel_what_would_drive_it() {
+    let fmu = fmu();
+    let scene = Scene {
+        // as hosts leave what they do not use
+        reals: &[("step", 0.002), ("tip.driven_orientation[1]", 0.0), ("tip.driven_orientation[3]", 0.0)],
+        ..FIXED
+    };
+    let slave = scene.slave(&fmu);
+    let time = scene.run(&slave, &fmu);
+    slave.do_step(time, STEP).unwrap();
+    let (unknown, _) = those(Variable::is_output);
+    let (known, _) = those(|variable| variable.row.name.starts_with("tip.driven"));
+    assert_eq!(known.len(), 13);
+    for known in known {
+        let derivatives = slave.directional_derivative(&unknown, &[known], &[1.0]).unwrap();
+        assert!(derivatives.iter().all(|x| *x == 0.0), "{known}: {derivatives:?}");
+    }
+}
+
+#[test]
 fn derivatives_of_a_start_are_those_of_other_starts() {
     let fmu = fmu();
     let (known, knowns) = those(Variable::is_settable_while_stepping);
