@@ -243,17 +243,14 @@ impl Whole {
         }
     }
 
-    /// Seconds of a step, the median of many.
+    /// Seconds of a step, as the mean of some.
     fn seconds(&mut self, cells: usize) -> f64 {
         let repetitions = (300 / cells).max(1);
-        let sample = |_| {
-            let start = Instant::now();
-            for _ in 0..repetitions {
-                black_box(self.step());
-            }
-            start.elapsed().as_secs_f64() / repetitions as f64
-        };
-        median((0..9).map(sample).collect())
+        let start = Instant::now();
+        for _ in 0..repetitions {
+            black_box(self.step());
+        }
+        start.elapsed().as_secs_f64() / repetitions as f64
     }
 }
 
@@ -264,11 +261,19 @@ fn whole_steps() {
         println!("\nOne step {what}, {WHOLE_STAGES} Gauss points in a cell: instructions and time");
         let names = ["per cell", "further cell", "per section", "ns per cell", "iterations"];
         println!("{:>6}{}", "cells", names.map(|name| format!("{name:>14}")).concat());
+        let mut rods = CELLS.map(|cells| Whole::new(of, cells));
+        let iterations = rods.each_mut().map(Whole::step);
+        // in turn, as the speed of a machine changes within a second
+        let times = CELLS.map(|_| Vec::new());
+        let times = (0..9).fold(times, |mut times, _| {
+            for ((rod, cells), times) in rods.iter_mut().zip(CELLS).zip(&mut times) {
+                times.push(rod.seconds(cells) / cells as f64);
+            }
+            times
+        });
         let mut before: Option<(usize, f64)> = None;
-        for cells in CELLS {
-            let mut whole = Whole::new(of, cells);
-            let iterations = whole.step();
-            let time = whole.seconds(cells) / cells as f64;
+        for ((cells, times), iterations) in CELLS.into_iter().zip(times).zip(iterations) {
+            let time = median(times);
             let work = instructions(cells, WHOLE_STAGES, "step", of);
             let further = before.zip(work).map(|((c, w), work)| (work - w) / (cells - c) as f64);
             before = work.map(|work| (cells, work));
