@@ -297,7 +297,7 @@ pub struct Integrator {
     stepper: Stepper,
     /// Whether the rod is in its plane; else it is the stepper's.
     in_plane: bool,
-    planar: Option<Planar>,
+    planar: Option<Box<Planar>>,
     way: Way,
     scheme: Scheme,
     /// Longest step of generalized-α, s.
@@ -360,7 +360,7 @@ impl Integrator {
             plane.reserve(most);
             let room = || Disturbance::new(most * stages);
             let (pace, unwatched) = (pace(method.order as i32, PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
-            Planar {
+            Box::new(Planar {
                 kept: plane.kept(),
                 before: (pace, room(), unwatched),
                 plane,
@@ -368,7 +368,7 @@ impl Integrator {
                 disturbance: room(),
                 unwatched,
                 time,
-            }
+            })
         });
         let simple = pace(TR_BDF2.order, SPACE_SHARE, SHORTEST_STEP);
         let pace = pace(ESDIRK4.order, SPACE_SHARE, SHORTEST_STEP);
@@ -449,7 +449,7 @@ impl Integrator {
     pub fn take_damping(&mut self, rod: &Rod) {
         let own = &mut self.stepper.rod;
         (own.damping, own.drag) = (rod.damping, rod.drag);
-        if let Some(Planar { plane, .. }) = &mut self.planar {
+        if let Some(Planar { plane, .. }) = self.planar.as_deref_mut() {
             plane.take_damping(rod);
         }
     }
@@ -461,7 +461,7 @@ impl Integrator {
     pub fn damp(&mut self, rod: &Rod) -> Result<(), Diverged> {
         let before = self.stepper.rod.clone();
         self.take_damping(rod);
-        let started = match (self.way, &mut self.planar) {
+        let started = match (self.way, self.planar.as_deref_mut()) {
             (Way::Accurate { .. }, Some(Planar { plane, .. })) if self.in_plane => {
                 let drive = *plane.drive();
                 plane.start(&drive).map_err(singular)
@@ -501,7 +501,7 @@ impl Integrator {
     fn keep(&mut self) {
         let Self { in_plane, pace, simple, energy, effort, .. } = *self;
         self.before = Before { in_plane, pace, simple, energy, effort };
-        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = self.planar.as_deref_mut() {
             (before.0, before.2) = (*pace, *unwatched);
             before.1.copy_from(disturbance);
         }
@@ -523,7 +523,7 @@ impl Integrator {
         (self.in_plane, self.pace, self.simple) = (in_plane, pace, simple);
         (self.energy, self.effort) = (energy, effort);
         // a plane that the interval has entered keeps nothing of it
-        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = &mut self.planar {
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = self.planar.as_deref_mut() {
             (*pace, *unwatched) = (before.0, before.2);
             disturbance.copy_from(&before.1);
         }
@@ -583,7 +583,7 @@ impl Integrator {
 
     /// Enters or leaves a plane, as all that acts in the interval makes it.
     fn choose(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) {
-        let Some(Planar { plane, disturbance, unwatched, .. }) = &mut self.planar else { return };
+        let Some(Planar { plane, disturbance, unwatched, .. }) = self.planar.as_deref_mut() else { return };
         let begin = drive(0.0);
         // velocities on a smooth path are parabolas, here at least: three of them decide
         let ahead = [drive(0.5 * duration), drive(duration)];
@@ -619,9 +619,10 @@ impl Integrator {
         let Some(mut planar) = self.planar.take() else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
-        planar.plane.look(1.0, &begin);
-        // what pulls the rod may be other than before
-        self.energy = self.energy.now(&planar.plane.energy());
+        if planar.plane.look(1.0, &begin) {
+            // what pulls the rod may be other than before
+            self.energy = self.energy.now(&planar.plane.energy());
+        }
         if self.effort.steps > 0 {
             self.adapt_in_plane(&mut planar, &begin);
         }
@@ -1009,7 +1010,7 @@ impl Integrator {
 
     /// The same in the plane that the rod stays in.
     fn repeat_in_plane(&mut self, events: &[Event], drive: &impl Fn(f64) -> Drive) -> Result<(), Failed> {
-        let Some(Planar { plane, .. }) = &mut self.planar else { return Ok(()) };
+        let Some(Planar { plane, .. }) = self.planar.as_deref_mut() else { return Ok(()) };
         plane.look(1.0, &drive(0.0));
         self.energy = self.energy.now(&plane.energy());
         let mut time = 0.0;
@@ -1127,7 +1128,7 @@ impl Integrator {
 
     /// The rod in space at present, wherever it is.
     pub fn in_space(&mut self) -> &mut Stepper {
-        if let Some(Planar { plane, .. }) = self.planar.as_mut().filter(|_| self.in_plane) {
+        if let Some(Planar { plane, .. }) = self.planar.as_deref_mut().filter(|_| self.in_plane) {
             write(plane, &mut self.stepper);
         }
         &mut self.stepper
@@ -1196,7 +1197,7 @@ impl Archived for Integrator {
         effort.visit(archive)?;
         // of a length summed up over the cells of the start
         large.visit(archive)?;
-        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = planar {
+        if let Some(Planar { pace, disturbance, unwatched, before, .. }) = planar.as_deref_mut() {
             let (pace, disturbance, unwatched) = match loading {
                 true => (&mut before.0, &mut before.1, &mut before.2),
                 false => (pace, disturbance, unwatched),
@@ -1205,7 +1206,7 @@ impl Archived for Integrator {
             disturbance.visit(archive)?;
             unwatched.visit(archive)?;
         }
-        match planar {
+        match planar.as_deref_mut() {
             Some(Planar { kept, .. }) if *in_plane && loading => kept.visit(archive)?,
             Some(Planar { plane, kept, .. }) if *in_plane => {
                 let mut kept = kept.clone();

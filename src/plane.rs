@@ -453,6 +453,7 @@ pub struct Plane {
     tip: Node,
     /// The instant looked at, and what acts if that is the present.
     looked_at: Boundary,
+    looks: u64,
     seen: Option<Drive>,
     look_points: Vec<Points>,
 }
@@ -482,12 +483,12 @@ fn section_in(mesh: &Mesh, rod: &Rod, base: &Mat3, normal: &Vec3) -> Option<Sect
 
 /// Whether `vector` has no component across `axis` but rounding of its own or of something of size `floor`.
 fn is_parallel(vector: &Vec3, axis: &Vec3, floor: f64) -> bool {
-    (vector - axis * axis.dot(vector)).norm() <= ROUNDING * vector.norm().max(floor)
+    (vector - axis * axis.dot(vector)).norm_squared() <= ROUNDING * ROUNDING * vector.norm_squared().max(floor * floor)
 }
 
 /// Whether it has none along `axis`.
 fn is_normal(vector: &Vec3, axis: &Vec3, floor: f64) -> bool {
-    axis.dot(vector).abs() <= ROUNDING * vector.norm().max(floor)
+    axis.dot(vector).powi(2) <= ROUNDING * ROUNDING * vector.norm_squared().max(floor * floor)
 }
 
 /// The vectors of a drive that lie in the plane and those normal to it, each with a size that is small for this rod.
@@ -541,6 +542,7 @@ impl Plane {
             ends: Ends::default(),
             next_ends: Ends::default(),
             looked_at: drive.boundary,
+            looks: 0,
             seen: None,
             drive,
             next_drive: drive,
@@ -718,7 +720,7 @@ impl Plane {
     pub(crate) fn bending(&self, cell: usize, series: &Series) -> Bending {
         let (field, next) = (&self.fields[cell], self.fields.get(cell + 1).map_or(&self.tip, |field| &field.node));
         let per_stiffness = 1.0 / self.section.stiffness;
-        let size = |[x, y]: [f64; 2]| f64::hypot(x, y);
+        let size = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
         let points = field.moment.map(|m| m * per_stiffness);
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         Bending {
@@ -1303,11 +1305,11 @@ fn eliminate<const K: usize, const N: usize>(rows: &mut [[f64; N]; K]) -> Option
 impl Plane {
     /// Looks at the fraction of the last accepted step, 0 to 1, under what acts then; 1 is the present. All that is read
     /// out refers to the instant last looked at. A fraction within the step holds to the order of the estimate, and
-    /// until the next attempt.
-    pub fn look(&mut self, fraction: f64, drive: &Drive) {
+    /// until the next attempt. Whether it was not looked at already.
+    pub fn look(&mut self, fraction: f64, drive: &Drive) -> bool {
         let present = (fraction == 1.0).then_some(*drive);
         if present.is_some() && present == self.seen {
-            return;
+            return false;
         }
         self.seen = present;
         if present.is_some() {
@@ -1325,6 +1327,12 @@ impl Plane {
             }
         }
         self.see(drive);
+        true
+    }
+
+    /// How often something else was looked at.
+    pub(crate) fn looks(&self) -> u64 {
+        self.looks
     }
 
     /// Order of its steps.
@@ -1404,6 +1412,7 @@ impl Plane {
             (field.node.force, field.node.moment) = (n, m);
         }
         self.looked_at = drive.boundary;
+        self.looks = self.looks.wrapping_add(1);
     }
 
     /// The tip.

@@ -51,7 +51,7 @@ const CALIBRATION: f64 = 2.0;
 /// by its changes than it is the more exact.
 const SHARE: f64 = 0.25;
 /// Part of that which a pair of cells must keep below once joined.
-const JOINED: f64 = 0.02;
+const JOINED: f64 = 0.05;
 /// Times what a cell may use up at which the step that has brought it there is taken back. A blow or a jerk to a hanging
 /// cord costs at most the tolerance then, and up to 5 times that with a factor of 10.
 const REFUSED: f64 = 2.0;
@@ -82,6 +82,8 @@ pub struct Refiner {
     errors: Vec<f64>,
     lately: Vec<f64>,
     turns: Vec<f64>,
+    /// What the [plane](Plane::looks) has looked at, of which they are.
+    seen: Option<u64>,
     /// Halvings of each cell, and its place in its coarsest one in units of the smallest.
     places: Vec<(usize, u32, u32)>,
     /// The next cells, and those of which they come.
@@ -92,7 +94,7 @@ pub struct Refiner {
 }
 
 archived!(Refiner { waited, lately } but {
-    tolerance, most_cells, coarsest, rule, errors, turns, places, cells, origins, series, kept
+    tolerance, most_cells, coarsest, rule, errors, turns, seen, places, cells, origins, series, kept
 });
 
 impl Refiner {
@@ -115,6 +117,7 @@ impl Refiner {
             lately: room(),
             kept: room(),
             turns: room(),
+            seen: None,
             places: Vec::with_capacity(most_cells),
             cells: Vec::with_capacity(most_cells),
             origins: Vec::with_capacity(most_cells),
@@ -217,11 +220,18 @@ impl Refiner {
 
     /// The same of a rod in a plane, as it was last looked at.
     pub fn estimate_plane(&mut self, plane: &Plane) -> f64 {
-        self.estimate(plane.mesh(), plane.stiffness(), |series, j| plane.bending(j, series))
+        // of the end of a step it is asked twice: whether that is good enough, and what is to follow
+        if self.seen == Some(plane.looks()) {
+            return self.estimated();
+        }
+        let error = self.estimate(plane.mesh(), plane.stiffness(), |series, j| plane.bending(j, series));
+        self.seen = Some(plane.looks());
+        error
     }
 
     fn estimate(&mut self, mesh: &Mesh, stiffness: f64, bending: impl Fn(&Series, usize) -> Bending) -> f64 {
         let (length, stages) = (mesh.length(), mesh.rule.stages as i32);
+        self.seen = None;
         self.errors.clear();
         self.turns.clear();
         for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
