@@ -1,7 +1,7 @@
-//! `documentation/index.html`: what the README says of the unit, and every variable of the table.
+//! `documentation/index.html`: what the pages of the repository say of the unit, and every variable of the table.
 //!
-//! The text is that of the README, lest two accounts of the limits drift apart. Of Markdown it knows what stands there:
-//! paragraphs, lists, code and bold.
+//! The text is that of the pages, lest two accounts of the limits drift apart. Of Markdown it knows what stands there:
+//! headings, paragraphs, lists, code and bold.
 
 use super::sketch;
 use crate::fmi2::description::{Xml, markup, triple};
@@ -19,24 +19,30 @@ pub const INDEX: &str = "documentation/index.html";
 
 const README: &str = include_str!("../../README.md");
 
-/// Parts of the README and what they are called here.
-const SECTIONS: [(&str, &str); 3] =
-    [("Variables", "Conventions"), ("Limits", "Limits"), ("How it works", "How it works")];
+/// Pages, and what they are called here.
+const PAGES: [(&str, &str); 3] = [
+    ("Conventions", include_str!("../../docs/variables.md")),
+    ("Limits", include_str!("../../docs/limits.md")),
+    ("How it works", include_str!("../../docs/how-it-works.md")),
+];
 
 const STYLE: &str = "body { font: 15px/1.45 sans-serif; max-width: 62em; margin: 2em auto; padding: 0 1em; color: #282c34 } \
     table { border-collapse: collapse; width: 100% } svg { max-width: 100%; height: auto } \
     th, td { text-align: left; vertical-align: top; padding: 0.25em 0.9em 0.25em 0; border-bottom: 1px solid #cdd1d8 } \
     code, td:first-child { font-family: monospace }";
 
-/// A paragraph, or an item of a list, with its markup.
+/// A heading within a page, a paragraph, or an item of a list, with its markup.
 #[derive(Debug, PartialEq)]
 enum Block {
+    Heading(String),
     Paragraph(String),
     Item(String),
 }
 
-/// The paragraphs and lists of a text; tables, pictures and code are left out.
-fn blocks(text: &str) -> Vec<Block> {
+/// What stands below the title of a page; tables, pictures and code are left out.
+fn blocks(page: &str) -> Vec<Block> {
+    let (title, text) = page.split_once("\n\n").unwrap_or_default();
+    debug_assert!(title.starts_with("# "), "a page begins with its title");
     let mut blocks = Vec::new();
     let mut open: Option<Block> = None;
     let mut fenced = false;
@@ -47,27 +53,21 @@ fn blocks(text: &str) -> Vec<Block> {
             blocks.extend(open.take());
             continue;
         }
+        if let Some(heading) = line.strip_prefix("## ") {
+            blocks.extend(open.replace(Block::Heading(heading.to_owned())));
+            continue;
+        }
         match (line.strip_prefix("- "), &mut open) {
             (Some(item), _) => blocks.extend(open.replace(Block::Item(item.to_owned()))),
             (None, Some(Block::Paragraph(text) | Block::Item(text))) => {
                 text.push(' ');
                 text.push_str(line.trim());
             }
-            (None, None) => open = Some(Block::Paragraph(line.to_owned())),
+            (None, _) => open = Some(Block::Paragraph(line.to_owned())),
         }
     }
     blocks.extend(open);
     blocks
-}
-
-/// What stands under a heading of the README; under its title for an empty name.
-fn section(name: &str) -> &'static str {
-    let (title, rest) = README.split_once("\n\n").unwrap_or_default();
-    debug_assert!(title.starts_with("# "), "the README begins with its title");
-    let found =
-        if name.is_empty() { Some(rest) } else { rest.split_once(&format!("\n## {name}\n")).map(|(_, found)| found) };
-    let found = found.unwrap_or_default();
-    found.split_once("\n## ").map_or(found, |(found, _)| found)
 }
 
 /// The whole page of a model.
@@ -98,13 +98,13 @@ fn body(xml: &mut Xml, model: &Model) -> io::Result<()> {
         this_rod(xml, model)?;
     }
     // up to the picture
-    for block in blocks(section("")).iter().take(1) {
+    for block in blocks(README).iter().take(1) {
         flow(xml, block)?;
     }
     sketch::draw(xml)?;
-    for (name, title) in SECTIONS {
+    for (title, page) in PAGES {
         text(xml, "h2", title)?;
-        let blocks = blocks(section(name));
+        let blocks = blocks(page);
         for run in blocks.chunk_by(|a, b| matches!((a, b), (Block::Item(_), Block::Item(_)))) {
             match run {
                 [Block::Item(_), ..] => {
@@ -147,6 +147,7 @@ fn text(xml: &mut Xml, element: &str, text: &str) -> io::Result<()> {
 /// A block with its code and its bold words.
 fn flow(xml: &mut Xml, block: &Block) -> io::Result<()> {
     let (element, content) = match block {
+        Block::Heading(text) => ("h3", text),
         Block::Paragraph(text) => ("p", text),
         Block::Item(text) => ("li", text),
     };
@@ -226,22 +227,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_readme_has_the_sections_and_only_known_markup() {
-        for name in [""].into_iter().chain(SECTIONS.map(|(name, _)| name)) {
-            let blocks = blocks(section(name));
-            assert!(!blocks.is_empty(), "{name}");
-            for Block::Paragraph(text) | Block::Item(text) in &blocks {
+    fn the_pages_have_only_known_markup() {
+        for (title, page) in PAGES {
+            let blocks = blocks(page);
+            assert!(!blocks.is_empty(), "{title}");
+            for Block::Heading(text) | Block::Paragraph(text) | Block::Item(text) in &blocks {
                 let even = |mark: &str| text.matches(mark).count() % 2 == 0;
-                assert!(name.is_empty() || even("`") && even("**") && !text.contains("]("), "{name}: {text}");
+                assert!(even("`") && even("**") && !text.contains("]("), "{title}: {text}");
             }
+            let bare = blocks.windows(2).find(|pair| matches!(pair, [Block::Heading(_), Block::Heading(_)]));
+            assert_eq!(bare, None, "{title}: without its table nothing is left under the first");
         }
     }
 
     #[test]
-    fn blocks_are_paragraphs_and_items() {
+    fn blocks_are_headings_paragraphs_and_items() {
+        let heading = Block::Heading("Then".to_owned());
         let paragraph = |text: &str| Block::Paragraph(text.to_owned());
         let item = |text: &str| Block::Item(text.to_owned());
-        let text = "one\nline\n\n| a |\n|---|\n- first\n  goes on\n- second\n\n```\ncode\n```\nlast\n";
-        assert_eq!(blocks(text), [paragraph("one line"), item("first goes on"), item("second"), paragraph("last")]);
+        let page =
+            "# A\n\none\nline\n\n| a |\n|---|\n- first\n  goes on\n- second\n\n## Then\n\n```\ncode\n```\nlast\n";
+        let expected = [paragraph("one line"), item("first goes on"), item("second"), heading, paragraph("last")];
+        assert_eq!(blocks(page), expected);
     }
 }
