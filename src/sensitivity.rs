@@ -109,8 +109,8 @@ fn moved(acting: &Acting, distance: f64, direction: &Acting) -> Acting {
     }
 }
 
-/// How many times `direction`, from what is `acting`, moves the rod as far as it is long, in the time in which gravity or stiffness do. The ends
-/// get to their velocity, and to a position that its velocity is derived of, within the step.
+/// How many times `direction`, from what is `acting`, moves the rod as far as it is long, in the time in which gravity or
+/// stiffness do. The ends get to their velocity, and to a position that its velocity is derived of, within the step.
 fn size(direction: &Acting, acting: &Acting, response: &Response) -> f64 {
     let parameters = response.parameters();
     let (rod, length) = (parameters.rod(), parameters.length);

@@ -819,7 +819,9 @@ impl Stepper {
     }
 
     /// How much of the rod the base feels at once, kg, world frame: the force on the base is less by this times what the
-    /// acceleration of the base is more. Zero for a rod that shears or stretches, whose centreline follows later.
+    /// acceleration of the base is more. Zero for a rod that shears or stretches, whose centreline follows later. It is all
+    /// that is felt at once: a base that begins to turn bends the rod first, and what an acceleration does comes without
+    /// a moment.
     ///
     /// # Errors
     /// [`Diverged`] as of [`Self::start`]; the state is as before in any case.

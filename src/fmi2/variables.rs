@@ -399,7 +399,7 @@ pub static ROWS: &[Row] = &[
     array("coupling.base_acceleration", "m/s2", XYZ, Output(|o, k| o.base_acceleration[k], Initially::Constant),
         "Acceleration of the base point on its path at the end of the step, world frame"),
     array("coupling.effective_mass", "kg", MATRIX, Output(|o, k| o.effective_mass[(k / 3, k % 3)], MASS),
-        "How much of the rod the base feels at once: base.reaction_force changes by minus this times a change of the acceleration of the base point, world frame, row by row; 0 unless the parameter effective_mass is true, and for a rod that is extensible"),
+        "How much of the rod the base feels at once: base.reaction_force changes by minus this times a change of the acceleration of the base point, world frame, row by row; a moment comes with it as little as a force with turning: both bend the rod first; 0 unless the parameter effective_mass is true, and for a rod that is extensible"),
     scalar("solver.steps", "", IntegerOutput(|o| o.solver.steps, Initially::Constant),
         "Internal steps since the start"),
     scalar("solver.iterations", "", IntegerOutput(|o| o.solver.iterations, START),
