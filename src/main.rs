@@ -27,7 +27,7 @@ enum Command {
         /// Where to write the FMU; without it, to target/ under the name of the model.
         #[arg(short, long)]
         output: Option<PathBuf>,
-        /// A library for this platform that was built elsewhere; without it, the one built with this program.
+        /// A library built elsewhere, for this platform or win64; without it, the one built with this program.
         #[arg(long, value_name = "LIBRARY", conflicts_with = "merge")]
         library: Option<PathBuf>,
         /// FMUs of the same model, built on other platforms: writes one with the libraries of all.
@@ -67,7 +67,11 @@ fn run(command: Command) -> Result<(), Box<dyn Error>> {
             let output = output.unwrap_or_else(|| Path::new("target").join(format!("{}.fmu", model.name)));
             match library {
                 _ if !merge.is_empty() => package::merge(&merge, &output)?,
-                Some(library) => package::package_library(&library, &output, &model)?,
+                Some(library) => {
+                    if package::package_library(&library, &output, &model)? == package::Checked::Read {
+                        eprintln!("cosserat: {} is for another platform and was not run", library.display());
+                    }
+                }
                 None => package::package(&output, &model)?,
             }
             println!("{}", output.display());

@@ -414,6 +414,9 @@ fn check_passes_what_is_packaged_and_names_what_is_wrong() {
     package::package(&archive, &Model::default()).unwrap();
     let text = cosserat(&directory, &["check", "rod.fmu"]);
     assert!(text.lines().count() == 13 && text.lines().all(|line| line.starts_with("ok  ")), "{text}");
+    let library = binary(MODEL_IDENTIFIER);
+    let platform = library.split('/').nth(1).unwrap();
+    assert!(text.contains(&format!("{library} in the archive, which is for {platform}\n")), "{text}");
 
     let files = unzipped(&archive);
     let check = |name: &str, change: &dyn Fn(&mut Files), expected: &str| {
@@ -433,7 +436,6 @@ fn check_passes_what_is_packaged_and_names_what_is_wrong() {
         let xml = edited(from, to);
         check(name, &|files| drop(files.insert(XML.to_owned(), xml.clone())), expected);
     };
-    let library = binary(MODEL_IDENTIFIER);
     let missing = format!("binary: no {library} in the archive, which is for none64");
     check("no_xml.fmu", &|files| drop(files.remove(XML)), "description: no modelDescription.xml in the archive");
     let elsewhere = |files: &mut Files| {

@@ -172,6 +172,63 @@ fn a_library_built_elsewhere_is_packaged_if_it_fits() {
     assert!(!directory.join("c.fmu").exists());
 }
 
+/// As little of a DLL as exports these functions: headers, one section whose addresses are offsets in the file, and in it
+/// the directory of exports, its three tables and the names.
+fn dll(functions: &[String]) -> Vec<u8> {
+    const SECTION: usize = 0x200;
+    let count = functions.len();
+    let tables = SECTION + 40;
+    let texts = tables + 10 * count;
+    let mut bytes = vec![0; texts];
+    for (k, name) in functions.iter().enumerate() {
+        let at = bytes.len() as u32;
+        // an address in the section, but not in the directory, where it would name another library
+        bytes[tables + 4 * k..][..4].copy_from_slice(&(u32::MAX / 2).to_le_bytes());
+        bytes[tables + 4 * (count + k)..][..4].copy_from_slice(&at.to_le_bytes());
+        bytes[tables + 8 * count + 2 * k..][..2].copy_from_slice(&(k as u16).to_le_bytes());
+        bytes.extend(name.bytes().chain([0]));
+    }
+    let size = bytes.len() - SECTION;
+    let mut put = |at: usize, value: usize| bytes[at..at + 4].copy_from_slice(&(value as u32).to_le_bytes());
+    // signatures; x86-64 and one section; 240 bytes of optional header, of a DLL; sixteen directories, of which the first
+    for (at, value) in [(0, 0x5a4d), (60, 64), (64, 0x4550), (68, 0x1_8664), (84, 0x2022_00f0), (88, 0x20b)] {
+        put(at, value);
+    }
+    for (at, value) in
+        [(196, 16), (200, SECTION), (204, size), (336, size), (340, SECTION), (344, size), (348, SECTION)]
+    {
+        put(at, value);
+    }
+    for (field, value) in [(20, count), (24, count), (28, tables), (32, tables + 4 * count), (36, tables + 8 * count)] {
+        put(SECTION + field, value);
+    }
+    bytes
+}
+
+#[cfg(not(windows))]
+#[test]
+fn a_library_for_windows_is_read_instead_of_run() {
+    let directory = directory("windows");
+    let functions: Vec<String> = (0..34).map(|k| format!("fmi2{k}")).collect();
+    fs::write(directory.join("rod.dll"), dll(&functions)).unwrap();
+    let (success, notice) = cosserat(&directory, &["package", "--library", "rod.dll", "-o", "win64.fmu"]);
+    assert!(success && notice.contains("rod.dll is for another platform and was not run"), "{notice}");
+    let windows = "binaries/win64/CosseratRod.dll";
+    let names = package::names(&directory.join("win64.fmu")).unwrap();
+    assert_eq!(names.iter().filter(|name| name.starts_with("binaries/")).collect::<Vec<_>>(), [windows]);
+
+    // with that of this platform
+    package::package(&directory.join("here.fmu"), &Model::default()).unwrap();
+    let both = cosserat(&directory, &["package", "--merge", "here.fmu", "win64.fmu", "-o", "both.fmu"]);
+    assert_eq!(both, (true, String::new()));
+    assert!(package::names(&directory.join("both.fmu")).unwrap().contains(&windows.to_owned()));
+
+    fs::write(directory.join("old.dll"), dll(&functions[1..])).unwrap();
+    let (success, error) = cosserat(&directory, &["package", "--library", "old.dll", "-o", "old.fmu"]);
+    assert!(!success && error.contains("exports 33 functions of FMI, 34 are needed"), "{error}");
+    assert!(!directory.join("old.fmu").exists());
+}
+
 #[test]
 fn the_unpacked_archive_runs() {
     let directory = directory("unpacked");

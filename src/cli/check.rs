@@ -181,12 +181,12 @@ fn outputs(model: &Description) -> Found {
 
 fn binary(model: &Description, names: &[String]) -> Found {
     let binary = model.binary();
-    if names.contains(&binary) {
-        return Ok(binary);
-    }
     let platforms: Vec<&str> = platforms(names).into_iter().collect();
-    let others = if platforms.is_empty() { "no platform".to_owned() } else { platforms.join(", ") };
-    Err(format!("no {binary} in the archive, which is for {others}"))
+    let platforms = if platforms.is_empty() { "no platform".to_owned() } else { platforms.join(", ") };
+    match names.contains(&binary) {
+        true => Ok(format!("{binary} in the archive, which is for {platforms}")),
+        false => Err(format!("no {binary} in the archive, which is for {platforms}")),
+    }
 }
 
 /// From the first call to the last, with one step between.

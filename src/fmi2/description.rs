@@ -20,11 +20,20 @@ pub const MODEL_IDENTIFIER: &str = "CosseratRod";
 
 /// Where in an archive the library of a model lies for the platform this was compiled for, with forward slashes.
 pub fn binary(identifier: &str) -> String {
-    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+    binary_for(identifier, std::env::consts::OS, std::env::consts::ARCH)
+}
+
+/// The same for a platform by the names that Rust has for it.
+pub fn binary_for(identifier: &str, os: &str, arch: &str) -> String {
     let short = match os {
         "windows" => "win",
         "macos" => "darwin",
         other => other,
+    };
+    let suffix = match os {
+        "windows" => "dll",
+        "macos" => "dylib",
+        _ => "so",
     };
     // The names from before revision 2.0.4 of the standard are those of the two Intel architectures.
     let platform = match arch {
@@ -32,7 +41,7 @@ pub fn binary(identifier: &str) -> String {
         "x86" => format!("{short}32"),
         other => format!("{other}-{short}"),
     };
-    format!("binaries/{platform}/{identifier}{}", std::env::consts::DLL_SUFFIX)
+    format!("binaries/{platform}/{identifier}.{suffix}")
 }
 
 /// End of the default experiment, s; it starts at 0.

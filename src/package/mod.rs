@@ -17,6 +17,7 @@ pub mod rod_file;
 use crate::fmi2::model::{self, Model};
 use crate::fmi2::{description, host};
 use crate::unit;
+use object::{Architecture, Object};
 use std::io::{self, Read, Write};
 use std::path::{self, Path, PathBuf};
 use std::{env, fmt, fs};
@@ -34,6 +35,11 @@ pub enum Error {
     },
     /// The library cannot be loaded, or is of another version than this program.
     Library(host::Error),
+    /// The library is for another platform, and does not export all functions of the unit.
+    Exports {
+        /// How many it does.
+        found: usize,
+    },
     /// The library does not take the rod.
     NoPlace(model::NoPlace),
     /// The icon cannot be drawn.
@@ -89,6 +95,9 @@ impl fmt::Display for Error {
                 places.iter().try_for_each(|place| write!(f, " {}", place.display()))
             }
             Self::Library(error) => write!(f, "the library does not fit this program, build both again: {error}"),
+            Self::Exports { found } => {
+                write!(f, "the library exports {found} functions of FMI, {FUNCTIONS} are needed")
+            }
             Self::NoPlace(error) => error.fmt(f),
             Self::Icon(error) => write!(f, "the icon of the archive: {error}"),
             Self::Reference(error) => write!(f, "the reference results of the archive: {error}"),
@@ -137,24 +146,55 @@ pub fn library() -> Result<PathBuf, Error> {
 /// # Errors
 /// [`Error`]
 pub fn package(archive: &Path, model: &Model) -> Result<(), Error> {
-    package_library(&library()?, archive, model)
+    package_library(&library()?, archive, model).map(drop)
 }
 
-/// Writes the archive with this library, built for the platform of the running program.
+/// Functions of FMI 2.0 co-simulation.
+const FUNCTIONS: usize = 34;
+
+/// How a library was checked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Checked {
+    /// An instance was made, which a library of another version refuses.
+    Run,
+    /// It is for another platform: its exports were counted.
+    Read,
+}
+
+/// How many functions of FMI a library for Windows on x86-64 exports; nothing of another file.
+fn windows_exports(code: &[u8]) -> Option<usize> {
+    let file =
+        object::read::pe::PeFile64::parse(code).ok().filter(|file| file.architecture() == Architecture::X86_64)?;
+    let is_function = |export: &object::Result<object::Export>| {
+        let name = export.as_ref().ok().map(object::Export::name);
+        matches!(name, Some(object::NameOrOrdinal::Name(name)) if name.starts_with(b"fmi2"))
+    };
+    Some(file.exports().map_or(0, |exports| exports.filter(is_function).count()))
+}
+
+/// Writes the archive with this library, built for the platform of the running program, or for Windows on x86-64.
 ///
 /// # Errors
 /// [`Error`]
-pub fn package_library(library: &Path, archive: &Path, model: &Model) -> Result<(), Error> {
-    // The loader looks for a name without a folder elsewhere. A library that was left over from another version answers
-    // to another GUID.
-    host::Fmu::from_library(&path::absolute(library).map_err(at(library))?)
-        .and_then(|fmu| fmu.instantiate("package", false).map(drop))
-        .map_err(Error::Library)?;
+pub fn package_library(library: &Path, archive: &Path, model: &Model) -> Result<Checked, Error> {
     let mut code = fs::read(library).map_err(at(library))?;
+    let (os, arch) = (env::consts::OS, env::consts::ARCH);
+    let (checked, binary) = match windows_exports(&code).filter(|_| (os, arch) != ("windows", "x86_64")) {
+        Some(FUNCTIONS) => (Checked::Read, description::binary_for(&model.name, "windows", "x86_64")),
+        Some(found) => return Err(Error::Exports { found }),
+        None => {
+            // The loader looks for a name without a folder elsewhere. A library that was left over from another version
+            // answers to another GUID.
+            host::Fmu::from_library(&path::absolute(library).map_err(at(library))?)
+                .and_then(|fmu| fmu.instantiate("package", false).map(drop))
+                .map_err(Error::Library)?;
+            (Checked::Run, description::binary(&model.name))
+        }
+    };
     if *model != Model::default() {
         model::write(&mut code, model).map_err(Error::NoPlace)?;
     }
-    let (binary, ports) = (description::binary(&model.name), terminals::ports_file(&model.name));
+    let ports = terminals::ports_file(&model.name);
     let [inputs, results, options] = reference::files(model).map_err(Error::Reference)?;
     let files = [
         (description::FILE, description::xml(model).into_bytes()),
@@ -170,7 +210,7 @@ pub fn package_library(library: &Path, archive: &Path, model: &Model) -> Result<
         (&results.0, results.1.into_bytes()),
         (&options.0, options.1.into_bytes()),
     ];
-    write(&files, archive)
+    write(&files, archive).map(|()| checked)
 }
 
 /// Writes one archive of several of the same model, built on different platforms: the files of the first and the
