@@ -1082,14 +1082,16 @@ impl Integrator {
         }
     }
 
-    /// Fills `points` with the centreline at equal arc lengths from the base to the tip, m, world frame.
-    pub fn centreline(&self, points: &mut [Vec3]) {
+    /// Fills `points` with the centreline at these `parts` of the arc length, in any order, m, world frame.
+    pub fn centreline(&self, parts: &[f64], points: &mut [Vec3]) {
         let Stepper { mesh, rod, state, .. } = &self.stepper;
         let mesh = self.plane().map_or(mesh, Plane::mesh);
-        let parts = (points.len() - 1).max(1) as f64;
         let (mut cell, mut start) = (0, 0.0);
-        for (i, point) in points.iter_mut().enumerate() {
-            let arc = mesh.length() * i as f64 / parts;
+        for (point, part) in points.iter_mut().zip(parts) {
+            let arc = mesh.length() * part;
+            if arc < start {
+                (cell, start) = (0, 0.0);
+            }
             while cell + 1 < mesh.cells.len() && arc > start + mesh.cells[cell].length {
                 start += mesh.cells[cell].length;
                 cell += 1;

@@ -86,6 +86,20 @@ fn errors_name_place_key_value_and_what_is_allowed() {
             "name = \"R\"\ncells = 1\nrest_curvature = [4, 0, 0]",
             "2:9: cells = 1 is not allowed: as many that the rest curvature turns less than 3 rad in each",
         ),
+        // stations
+        ("name = \"R\"\nstations = 0.5", "2:12: stations = 0.5 is not allowed: [...] of 1 to 11 arc lengths"),
+        ("name = \"R\"\nstations = []", "2:12: stations = [] is not allowed: [...] of 1 to 11 arc lengths"),
+        (
+            "name = \"R\"\nstations = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]",
+            "2:12: stations = [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0] is not allowed: [...] of 1 to 11 arc lengths",
+        ),
+        ("name = \"R\"\nstations = [0, 1.2]", "2:16: stations[2] = 1.2 is not allowed: from 0 to 1"),
+        (
+            "name = \"R\"\nlength = 2\nstations = [0, 1.2,\n -0.1]",
+            "4:2: stations[3] = -0.1 is not allowed: from 0 to 2",
+        ),
+        ("name = \"R\"\nstations = [\"tip\"]", "2:13: stations[1] = \"tip\" is not allowed: from 0 to 1"),
+        ("station = [0]", "1:1: station is unknown; is stations what is meant?"),
         // shapes
         (
             "name = \"R\"\nlength = 2\nshape = [{ kind = \"straight\", length = 1 }]",
@@ -409,6 +423,52 @@ fn two_rods_and_the_unit_itself_live_in_one_process() {
     assert_eq!(real(&fmus[1], &slaves[1], "radius"), 0.01);
 }
 
+/// Points of the rod itself, in any order, and no others.
+#[test]
+fn stations_lie_where_the_file_says() {
+    let lines = "length = 2\nstations = [2.0, 0.6, 0, 1.4]";
+    let [given, plain] = [("some", lines), ("all", "length = 2")].map(|(test, lines)| model(test, lines));
+    assert_eq!(given.parameters.stations, [1.0, 0.3, 0.0, 0.7]);
+    for (planar, length) in [(true, 2.0), (false, 2.0), (true, 1.5)] {
+        let unit = |model: &Model| {
+            let parameters = Parameters { planar, length, ..model.parameters.clone() };
+            let mut unit = Unit::new(&parameters, &model.inputs, None).unwrap();
+            (0..10).for_each(|_| assert_eq!(unit.advance(&model.inputs, 0.02), Ok(None)));
+            (unit.outputs().stations, unit.rates().unwrap().stations)
+        };
+        let (some, all) = (unit(&given), unit(&plain));
+        for (k, station) in [10, 3, 0, 7].into_iter().enumerate() {
+            assert!((some.0[k] - all.0[station]).norm() < 1e-12, "{planar} {length} {k}");
+            assert!((some.1[k] - all.1[station]).norm() < 1e-10, "{planar} {length} {k}");
+        }
+        assert!(some.0[4..].iter().all(|rest| *rest == Vec3::zeros()));
+    }
+    let refused = |stations: &[f64]| {
+        let parameters = Parameters { stations: stations.to_vec(), ..Parameters::default() };
+        Unit::new(&parameters, &Inputs::default(), None).unwrap_err().to_string()
+    };
+    assert_eq!(refused(&[]), "stations = 0 is not allowed: a whole number from 1 to 11");
+    assert_eq!(refused(&[0.0; 12]), "stations = 12 is not allowed: a whole number from 1 to 11");
+    assert_eq!(refused(&[0.0, 1.1]), "stations = 1.1 is not allowed: from 0 to 1");
+
+    // the unit has no others, and all else where it was
+    let (some, all) = (packaged("some_packaged", &given), packaged("all_packaged", &plain));
+    let station = |name: &&String| name.starts_with("station[");
+    assert_eq!(some.description.order.iter().filter(station).count(), 12);
+    let same =
+        |name: &&String| some.description.variables[*name].reference == all.description.variables[*name].reference;
+    assert!(some.description.order.iter().all(|name| same(&name)));
+    let slave = some.instantiate("rod", false).unwrap();
+    run(&some, &slave);
+    assert_eq!([1, 4].map(|i| real(&some, &slave, &format!("station[{i}].position[1]")) == 0.0), [false, false]);
+    let missing = all.description.reference("station[5].position[1]", cosserat_rod::fmi2::variables::Kind::Real);
+    let missing = missing.unwrap();
+    let error = slave.get_real(&[missing], &mut [0.0]).unwrap_err().to_string();
+    assert!(error.contains(&format!("value reference {missing} is not in the model description")), "{error}");
+    let moved = model("moved", "length = 2\nstations = [2.0, 0.60001, 0, 1.4]");
+    assert_ne!(description::guid(&moved), description::guid(&given));
+}
+
 #[test]
 fn shapes_that_the_description_does_not_show_have_guids_of_their_own() {
     let arc = |radius: &str| model(radius, &format!("shape = [{{ kind = \"arc\", radius = {radius}, length = 1 }}]"));
@@ -430,6 +490,8 @@ fn the_command_packages_a_file_and_the_others_take_it() {
     assert!(success && out == "target/CoilHose.fmu\n", "{out}{error}");
     let (success, out, error) = cosserat(&["check", "target/CoilHose.fmu"]);
     assert!(success && out.contains("CoilHose") && !out.contains("FAILED"), "{out}{error}");
+    let page = package::read(&directory.join("target/CoilHose.fmu"), "documentation/index.html").unwrap();
+    assert!(page.contains("<td>station[1..3].position[1..3]</td>"));
     let (success, out, error) = cosserat(&["info", "target/CoilHose.fmu"]);
     assert!(success && out.contains("CoilHose") && out.contains("tip.mass                  0.05 kg"), "{out}{error}");
     // it hangs as the unit says that it does

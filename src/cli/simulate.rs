@@ -297,7 +297,7 @@ impl Experiment {
 pub fn run(arguments: &Arguments) -> Result<(), Box<dyn error::Error>> {
     let Arguments { inputs, rod, set, stop, step, .. } = arguments;
     let experiment = Experiment::new(inputs.as_deref(), rod.as_deref(), set, *stop, *step)?;
-    let columns = outputs(&arguments.output)?;
+    let columns = outputs(&arguments.output, &experiment.parameters)?;
     let sink: Box<dyn Write> = match &arguments.out {
         Some(path) => Box::new(File::create(path).map_err(|error| Error::File { path: path.clone(), error })?),
         None => Box::new(io::stdout().lock()),
@@ -321,9 +321,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// The outputs of these names, in the order of the names; all if there are none.
-fn outputs(names: &[String]) -> Result<Vec<Variable>, Error> {
-    let known: Vec<Variable> = variables::all().into_iter().filter(Variable::is_output).collect();
+/// The outputs of these names, in the order of the names; all that the rod has if there are none.
+fn outputs(names: &[String], parameters: &Parameters) -> Result<Vec<Variable>, Error> {
+    let known = variables::all().into_iter();
+    let known: Vec<Variable> = known.filter(|one| one.is_output() && one.is_of(parameters)).collect();
     if names.is_empty() {
         return Ok(known);
     }

@@ -1,12 +1,14 @@
 //! The table of variables as `modelDescription.xml`, with the names and start values of a model.
 //!
-//! The GUID is a fingerprint of the text without it, and of the shape of the unstressed rod, of which that does not tell.
+//! The GUID is a fingerprint of the text without it, and of what that does not tell: the shape of the unstressed rod, and
+//! where exactly the stations lie.
 //! The library computes it from the table it was built with and the model that it holds: a description and a library
 //! that do not belong together cannot be instantiated.
 
 use super::model::{Experiment, Model};
 use super::variables::{self, Kind, Row, Slot, UNITS, Variable};
-use crate::rest::{Piece, RestShape};
+use crate::rest::Piece;
+use crate::unit::Parameters;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use quick_xml::writer::ElementWriter;
@@ -75,11 +77,10 @@ pub fn xml(model: &Model) -> String {
 /// The GUID, in braces.
 pub fn guid(model: &Model) -> String {
     let mut text = render(model, "").into_bytes();
+    let Parameters { rest_shape, stations, .. } = &model.parameters;
     let numbers = |piece: &Piece| [piece.part, piece.turn.x, piece.turn.y, piece.turn.z];
-    if model.parameters.rest_shape != RestShape::default() {
-        let numbers = model.parameters.rest_shape.pieces().iter().flat_map(numbers);
-        text.extend(numbers.flat_map(f64::to_le_bytes));
-    }
+    let numbers = rest_shape.pieces().iter().flat_map(numbers).chain(stations.iter().copied());
+    text.extend(numbers.flat_map(f64::to_le_bytes));
     let [a, b, c, d, e] = {
         let hash = format!("{:032x}", fingerprint(&text));
         [0..8, 8..12, 12..16, 16..20, 20..32].map(|range| hash[range].to_owned())
@@ -130,16 +131,20 @@ fn root(xml: &mut Xml, model: &Model, guid: &str) -> io::Result<()> {
             ("variableNamingConvention", "structured"),
         ])
         .write_inner_content(|xml| {
-            let variables = variables::all();
+            let listed = variables::all().into_iter().enumerate();
+            let listed: Vec<(usize, Variable)> = listed.filter(|(_, one)| one.is_of(&model.parameters)).collect();
             co_simulation(xml, &model.name)?;
             units(xml)?;
             log_categories(xml)?;
             default_experiment(xml, &model.experiment)?;
             xml.create_element("ModelVariables").write_inner_content(|xml| {
-                let (mut starts, mut each) = (model.starts(), variables.iter().enumerate());
-                each.try_for_each(|(reference, variable)| scalar(xml, reference, variable, starts(variable)))
+                let mut starts = model.starts();
+                listed.iter().try_for_each(|(reference, variable)| {
+                    let meaning = variable.description(&model.parameters);
+                    scalar(xml, *reference, variable, &meaning, starts(variable))
+                })
             })?;
-            structure(xml, &variables)
+            structure(xml, &listed)
         })?;
     Ok(())
 }
@@ -208,12 +213,12 @@ fn number<'a>(element: ElementWriter<'a, Vec<u8>>, name: &str, value: impl ToStr
     element.with_attribute((name, value.to_string().as_str()))
 }
 
-fn scalar(xml: &mut Xml, reference: usize, variable: &Variable, start: Option<f64>) -> io::Result<()> {
+fn scalar(xml: &mut Xml, reference: usize, variable: &Variable, meaning: &str, start: Option<f64>) -> io::Result<()> {
     let (causality, variability, initial) = triple(variable.row);
     let element = xml.create_element("ScalarVariable").with_attributes([
         ("name", variable.to_string().as_str()),
         ("valueReference", reference.to_string().as_str()),
-        ("description", variable.description().as_str()),
+        ("description", meaning),
         ("causality", causality),
         ("variability", variability),
     ]);
@@ -259,10 +264,11 @@ pub(crate) fn triple(row: &Row) -> (&'static str, &'static str, Option<&'static 
     }
 }
 
-/// The dependencies are argued at [`variables::Initially`]; indices are places among the variables, from 1.
-fn structure(xml: &mut Xml, variables: &[Variable]) -> io::Result<()> {
+/// The dependencies are argued at [`variables::Initially`]; indices are places among what is listed, from 1.
+fn structure(xml: &mut Xml, listed: &[(usize, Variable)]) -> io::Result<()> {
     let place = |index: usize| (index + 1).to_string();
-    let outputs = || variables.iter().enumerate().filter(|(_, variable)| variable.is_output());
+    let variables = || listed.iter().map(|(_, variable)| variable).enumerate();
+    let outputs = || variables().filter(|(_, variable)| variable.is_output());
     xml.create_element("ModelStructure").write_inner_content(|xml| {
         xml.create_element("Outputs").write_inner_content(|xml| {
             outputs().try_for_each(|(index, _)| {
@@ -274,7 +280,7 @@ fn structure(xml: &mut Xml, variables: &[Variable]) -> io::Result<()> {
         })?;
         xml.create_element("InitialUnknowns").write_inner_content(|xml| {
             outputs().try_for_each(|(index, unknown)| {
-                let known: Vec<String> = (variables.iter().enumerate())
+                let known: Vec<String> = variables()
                     .filter(|(_, known)| !known.is_output() && unknown.depends_initially_on(known))
                     .map(|(index, _)| place(index))
                     .collect();

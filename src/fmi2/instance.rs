@@ -267,7 +267,7 @@ impl fmt::Display for Failure {
             Self::NoModel(error) => write!(f, "the rod in this library cannot be read: {error}"),
             Self::UnknownReference { reference } => write!(
                 f,
-                "value reference {reference} is unknown: those of the model description run from 0 to {}",
+                "value reference {reference} is unknown: it is not in the model description, whose last one is {}",
                 variables::all().len() - 1
             ),
             Self::WrongKind { variable, asked } => {
@@ -798,6 +798,7 @@ impl Instance {
 
     fn variable(&self, reference: u32, kind: Kind) -> Result<Variable, Failure> {
         let variable = usize::try_from(reference).ok().and_then(|place| self.variables.get(place));
+        let variable = variable.filter(|variable| variable.is_of(&self.model.parameters));
         let variable = *variable.ok_or(Failure::UnknownReference { reference })?;
         if variable.kind() == kind { Ok(variable) } else { Err(Failure::WrongKind { variable, asked: kind }) }
     }

@@ -93,13 +93,24 @@ pub struct Row {
     pub copies: usize,
     /// Where it lives.
     pub slot: Slot,
-    /// Meaning, with frame, sign and reference point.
+    /// Meaning, with frame, sign and reference point; `[part]` stands for where the stations lie.
     pub description: &'static str,
 }
 
 impl Row {
     fn elements(&self) -> usize {
         self.components.len().max(1) * self.copies
+    }
+
+    /// The same with as many stations as a rod with these parameters has.
+    pub fn of(&self, parameters: &Parameters) -> Self {
+        Self { copies: self.copies.min(parameters.stations.len()), ..*self }
+    }
+
+    /// What it means where the stations lie at these parts of the length.
+    pub fn meaning(&self, parts: &[f64]) -> String {
+        let parts: Vec<String> = parts.iter().map(|part| ((part * 1e4).round() / 1e4).to_string()).collect();
+        self.description.replace("[part]", &parts.join(", "))
     }
 }
 
@@ -126,12 +137,14 @@ pub struct Variable {
 /// The names of this variable are dotted, its indices count from 1.
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.row.components.len().max(1);
         match self.row.name.split_once("[i]") {
-            Some((before, after)) => write!(f, "{before}[{}]{after}", self.element / width + 1)?,
+            Some((before, after)) => write!(f, "{before}[{}]{after}", self.copy() + 1)?,
             None => f.write_str(self.row.name)?,
         }
-        if self.row.components.is_empty() { Ok(()) } else { write!(f, "[{}]", self.element % width + 1) }
+        match self.row.components {
+            [] => Ok(()),
+            names => write!(f, "[{}]", self.element % names.len() + 1),
+        }
     }
 }
 
@@ -166,11 +179,23 @@ impl Variable {
         }
     }
 
-    /// What it means, with the component of an array named.
-    pub fn description(&self) -> String {
+    /// Which copy of its row it belongs to, from 0.
+    fn copy(&self) -> usize {
+        self.element / self.row.components.len().max(1)
+    }
+
+    /// Whether a rod with these parameters has it; value references count those that it has not as well.
+    pub fn is_of(&self, parameters: &Parameters) -> bool {
+        self.copy() < self.row.of(parameters).copies
+    }
+
+    /// What it means for a rod that has it, with the component of an array named.
+    pub fn description(&self, parameters: &Parameters) -> String {
+        let part = parameters.stations.get(self.copy()..=self.copy());
+        let meaning = self.row.meaning(part.unwrap_or_default());
         match self.row.components {
-            [] => self.row.description.to_owned(),
-            names => format!("{}: {}", self.row.description, names[self.element % names.len()]),
+            [] => meaning,
+            names => format!("{meaning}: {}", names[self.element % names.len()]),
         }
     }
 
@@ -379,7 +404,7 @@ pub static ROWS: &[Row] = &[
         "Moment the rod, with the body and the load at its tip, exerts on what drives the tip, about the tip point, world frame; add it to the moments there. Zero while tip.mode = 0"),
     Row { name: "station[i].position", unit: "m", components: XYZ, copies: STATIONS,
         slot: Output(|o, k| o.stations[k / 3][k % 3], SHAPE),
-        description: "Position of the centreline at equal arc lengths from the base (first) to the tip (last), world frame" },
+        description: "Position of the centreline at [part] of the length of the unstressed rod from the base, world frame" },
     scalar("energy.kinetic", "J", Output(|o, _| o.energy.kinetic, START),
         "Kinetic energy of the rod and the body at its tip"),
     scalar("energy.elastic", "J", Output(|o, _| o.energy.elastic, SHAPE),

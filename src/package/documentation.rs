@@ -101,7 +101,7 @@ fn body(xml: &mut Xml, model: &Model) -> io::Result<()> {
     for block in blocks(README).iter().take(1) {
         flow(xml, block)?;
     }
-    sketch::draw(xml)?;
+    sketch::draw(xml, &model.parameters.stations)?;
     for (title, page) in PAGES {
         text(xml, "h2", title)?;
         let blocks = blocks(page);
@@ -181,15 +181,16 @@ fn table(xml: &mut Xml, causality: &str, model: &Model) -> io::Result<()> {
         for row in ROWS.iter().filter(|row| triple(row).0 == causality) {
             let first = Variable { row, element: 0 };
             let kind = format!("{}, {}", first.kind().name(), triple(row).1);
-            let (name, start, allowed) = (row.to_string(), start(row, model), first.allowed().to_string());
+            let name = row.of(&model.parameters).to_string();
+            let (start, allowed) = (start(row, model), first.allowed().to_string());
             let mut cells = vec![name.as_str(), row.unit, &kind];
             if given {
                 cells.extend([start.as_str(), &allowed]);
             }
-            let meaning = match row.components {
-                [] => row.description.to_owned(),
-                names => format!("{}: {}", row.description, names.join(", ")),
-            };
+            let mut meaning = row.meaning(&model.parameters.stations);
+            if !row.components.is_empty() {
+                meaning += &format!(": {}", row.components.join(", "));
+            }
             cells.push(&meaning);
             line(xml, "td", &cells)?;
         }

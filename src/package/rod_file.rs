@@ -1,11 +1,11 @@
-//! A rod in a file: TOML, whose keys are the parameters and inputs of the unit by their names, and the shape of the
-//! unstressed rod as a list of pieces. Errors say where in the file they are.
+//! A rod in a file: TOML, whose keys are the parameters and inputs of the unit by their names, the shape of the unstressed
+//! rod as a list of pieces, and the arc lengths of its stations. Errors say where in the file they are.
 
 use super::centreline::{Curve, NoCurve, Stretch};
 use crate::fmi2::model::Model;
 use crate::fmi2::variables::{self, Kind, ROWS, Row, Variable};
 use crate::rest::{self, Piece, RestShape};
-use crate::unit::{self, Allowed, Unit};
+use crate::unit::{self, Allowed, STATIONS, Unit};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -23,7 +23,7 @@ const SHARE: f64 = 0.2;
 const LONGEST: [usize; 2] = [100, 1000];
 
 /// Keys beside those of the variables.
-const OTHER: [&str; 4] = ["name", "description", "shape", "experiment"];
+const OTHER: [&str; 5] = ["name", "description", "shape", "stations", "experiment"];
 const EXPERIMENT: [&str; 3] = ["stop_time", "step_size", "tolerance"];
 
 /// The kinds of pieces, each with its keys.
@@ -198,6 +198,9 @@ fn parse(text: &str) -> Found<Model> {
     if let Some(shape) = table.get("shape") {
         file.shape(shape)?;
     }
+    if let Some(stations) = table.get("stations") {
+        file.stations(stations)?;
+    }
     let Model { parameters, inputs, experiment, .. } = &file.model;
     match Unit::new(parameters, inputs, Some(experiment.tolerance)) {
         Ok(_) => Ok(file.model),
@@ -278,8 +281,8 @@ impl File<'_> {
                     self.experiment(value)?;
                     continue;
                 }
-                // once the tolerance is known
-                "shape" => continue,
+                // once tolerance and length are known
+                "shape" | "stations" => continue,
                 _ => {}
             }
             if let Some(row) = given().find(|row| row.name == name) {
@@ -404,6 +407,20 @@ impl File<'_> {
         self.model.parameters.length = length;
         self.model.parameters.rest_shape = RestShape::new(&pieces)
             .map_err(|invalid| Fault { at: value.span(), problem: Problem::NoShape(invalid) })?;
+        Ok(())
+    }
+
+    fn stations(&mut self, value: &Value) -> Found<()> {
+        let arcs = match value.get_ref() {
+            DeValue::Array(arcs) if (1..=STATIONS).contains(&arcs.len()) => arcs,
+            _ => return self.refused("stations", value, Needed::Such("[...] of 1 to 11 arc lengths")),
+        };
+        let length = self.model.parameters.length;
+        let part = |(k, arc): (usize, &Value)| {
+            let key = format!("stations[{}]", k + 1);
+            Ok(self.number(&key, arc, Kind::Real, Allowed::Between(0.0, length))? / length)
+        };
+        self.model.parameters.stations = arcs.iter().enumerate().map(part).collect::<Found<_>>()?;
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! The rod with its frames, ports and signs: the picture in the documentation, and the icon of the archive.
 
 use crate::fmi2::description::{Xml, markup};
+use crate::unit::Parameters;
 use quick_xml::events::BytesText;
 use std::io;
 
@@ -44,11 +45,11 @@ fn along(from: Point, direction: Point, length: f64) -> Point {
 
 /// The picture as a file.
 pub fn svg() -> String {
-    markup(draw)
+    markup(|xml| draw(xml, &Parameters::default().stations))
 }
 
-/// Draws it: the element `svg`.
-pub fn draw(xml: &mut Xml) -> io::Result<()> {
+/// Draws it, with stations at these parts of the length: the element `svg`.
+pub fn draw(xml: &mut Xml, stations: &[f64]) -> io::Result<()> {
     let (width, height) = (WIDTH.to_string(), HEIGHT.to_string());
     let frame = format!("0 0 {width} {height}");
     xml.create_element("svg")
@@ -65,8 +66,8 @@ pub fn draw(xml: &mut Xml) -> io::Result<()> {
             clamp(xml)?;
             let [a, b, c, d] = CURVE.map(|[x, y]| format!("{x},{y}"));
             path(xml, &format!("M{a} C{b} {c} {d}"), INK, 7.0, "none")?;
-            for k in 0..=10 {
-                circle(xml, centre(f64::from(k) / 10.0), 2.2, "#ffffff", "none")?;
+            for part in stations {
+                circle(xml, centre(*part), 2.2, "#ffffff", "none")?;
             }
             base(xml)?;
             tip(xml)?;

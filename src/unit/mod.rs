@@ -382,8 +382,13 @@ impl Unit {
         let v = q.fixed_rows::<3>(1).into_owned();
         let turned = (w * q[0] + w.cross(&v)) * 0.5;
         rates.tip_orientation = Vector4::new(-0.5 * w.dot(&v), turned.x, turned.y, turned.z);
-        rates.stations[0] = self.path.base().velocity;
-        rates.stations[STATIONS - 1] = now.tip_velocity;
+        for (rate, part) in rates.stations.iter_mut().zip(&self.start.parameters.stations) {
+            match *part {
+                0.0 => *rate = self.path.base().velocity,
+                1.0 => *rate = now.tip_velocity,
+                _ => {}
+            }
+        }
         (rates.energy.work_base, rates.energy.work_tip) = (now.power_base, now.power_tip);
         Ok(rates)
     }
@@ -404,8 +409,7 @@ impl Unit {
     }
 
     fn read_out(&mut self, end: &Boundary) {
-        let masses = self.start.parameters.wants_masses();
-        self.outputs.read(&mut self.integrator, end, masses);
+        self.outputs.read(&mut self.integrator, end, &self.start.parameters);
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the host may read at every communication point.
 
+use super::parameters::Parameters;
 use crate::archive::archived;
 use crate::boundary::Boundary;
 use crate::energy::Energy;
@@ -7,7 +8,7 @@ use crate::integrator::{Effort, Ends, Integrator};
 use crate::so3;
 use nalgebra::{Matrix3, Vector3, Vector4};
 
-/// Number of stations of the centreline handed out for drawing, base and tip included.
+/// Most stations of the centreline that are handed out.
 pub const STATIONS: usize = 11;
 
 /// What the host may read at every communication point, world frame.
@@ -29,7 +30,7 @@ pub struct Outputs {
     pub tip_reaction_force: Vector3<f64>,
     /// Moment the rod exerts on what drives its tip, about the tip point, N·m; zero where nothing does.
     pub tip_reaction_moment: Vector3<f64>,
-    /// Points of the centreline at equal arc lengths, first the base, last the tip, m.
+    /// Points of the centreline, where [`Parameters::stations`] says, m; the rest are zero.
     pub stations: [Vector3<f64>; STATIONS],
     /// Energies and works.
     pub energy: Energy,
@@ -99,8 +100,8 @@ impl Outputs {
         }
     }
 
-    /// What is to be read of a rod on which this acts at the `end` of a step; its effective mass if `masses` are wanted.
-    pub(super) fn read(&mut self, integrator: &mut Integrator, end: &Boundary, masses: bool) {
+    /// What is to be read of a rod with these parameters on which this acts at the `end` of a step.
+    pub(super) fn read(&mut self, integrator: &mut Integrator, end: &Boundary, parameters: &Parameters) {
         let base = &end.base;
         let Ends { position, rotation, velocity, angular_velocity, force, moment, tip_force, tip_moment } =
             integrator.ends();
@@ -122,8 +123,8 @@ impl Outputs {
             solver: *integrator.effort(),
             ..*self
         };
-        integrator.centreline(&mut self.stations);
-        if masses {
+        integrator.centreline(&parameters.stations, &mut self.stations);
+        if parameters.wants_masses() {
             // a rod that has moved has accelerations
             self.effective_mass = integrator.in_space().effective_mass().unwrap_or_default();
         }

@@ -1,6 +1,7 @@
 //! What is fixed before the run starts, or may be tuned while it lasts; and the start of a rod with it.
 
 use super::error::{Allowed, Error};
+use super::outputs::STATIONS;
 use crate::alpha::Scheme;
 use crate::archive::archived;
 use crate::boundary::Boundary;
@@ -79,6 +80,8 @@ pub struct Parameters {
     pub effective_mass: bool,
     /// What is not the same all along the unstressed rod; not to be set by the host.
     pub rest_shape: RestShape,
+    /// Where along the unstressed rod the stations lie, as parts of its length, up to [`STATIONS`]; not to be set by the host.
+    pub stations: Vec<f64>,
 }
 
 archived!(Parameters {
@@ -112,10 +115,11 @@ archived!(Parameters {
     quasi_static,
     effective_mass,
     rest_shape,
+    stations,
 });
 
 impl Default for Parameters {
-    /// A soft rubber rod of 1 m.
+    /// A soft rubber rod of 1 m, with stations at equal arc lengths from the base to the tip.
     fn default() -> Self {
         Self {
             length: 1.0,
@@ -148,6 +152,7 @@ impl Default for Parameters {
             quasi_static: false,
             effective_mass: false,
             rest_shape: RestShape::default(),
+            stations: (0..STATIONS).map(|i| i as f64 / (STATIONS - 1) as f64).collect(),
         }
     }
 }
@@ -287,7 +292,10 @@ impl Parameters {
     /// # Errors
     /// [`Error::NotAllowed`] names the first parameter.
     pub fn validate(&self) -> Result<(), Error> {
-        allow(self.numbers())
+        allow(self.numbers())?;
+        let count = ("stations", self.stations.len() as f64, Allowed::Choice(1, STATIONS as i32));
+        let parts = self.stations.iter().map(|part| ("stations", *part, Allowed::Between(0.0, 1.0)));
+        allow(std::iter::once(count).chain(parts))
     }
 
     /// The cells to begin with, and what refines them where they are not given.

@@ -56,7 +56,7 @@ impl Response<'_> {
         };
         let mut outputs = outputs.clone();
         let Outputs { solver, cells, .. } = outputs;
-        outputs.read(&mut rod, &end, start.parameters.wants_masses());
+        outputs.read(&mut rod, &end, &start.parameters);
         Ok(Outputs { solver, cells, ..outputs })
     }
 
