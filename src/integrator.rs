@@ -619,10 +619,9 @@ impl Integrator {
         let Some(mut planar) = self.planar.take() else { return 0.0 };
         let begin = drive(0.0);
         let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
-        if planar.plane.look(1.0, &begin) {
-            // what pulls the rod may be other than before
-            self.energy = self.energy.now(&planar.plane.energy());
-        }
+        planar.plane.look(1.0, &begin);
+        // what pulls the rod may be other than before
+        self.energy = self.energy.now(&planar.plane.energy());
         if self.effort.steps > 0 {
             self.adapt_in_plane(&mut planar, &begin);
         }

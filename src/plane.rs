@@ -1305,11 +1305,11 @@ fn eliminate<const K: usize, const N: usize>(rows: &mut [[f64; N]; K]) -> Option
 impl Plane {
     /// Looks at the fraction of the last accepted step, 0 to 1, under what acts then; 1 is the present. All that is read
     /// out refers to the instant last looked at. A fraction within the step holds to the order of the estimate, and
-    /// until the next attempt. Whether it was not looked at already.
-    pub fn look(&mut self, fraction: f64, drive: &Drive) -> bool {
+    /// until the next attempt.
+    pub fn look(&mut self, fraction: f64, drive: &Drive) {
         let present = (fraction == 1.0).then_some(*drive);
         if present.is_some() && present == self.seen {
-            return false;
+            return;
         }
         self.seen = present;
         if present.is_some() {
@@ -1327,7 +1327,6 @@ impl Plane {
             }
         }
         self.see(drive);
-        true
     }
 
     /// How often something else was looked at.
