@@ -56,6 +56,11 @@ impl Energy {
         energy
     }
 
+    /// What gravity and bending can give a rod of this length, m, J.
+    pub fn large(rod: &Rod, length: f64, gravity: &Vector3<f64>) -> f64 {
+        rod.mass_per_length * length * gravity.norm() * length + rod.stiffness.max() / length
+    }
+
     /// Energies after a step from `old` to `new`, with the works and losses of the step added.
     pub fn after(&self, mesh: &Mesh, rod: &Rod, old: &State, new: &State, boundary: &Boundary) -> Self {
         let turn = |from: &nalgebra::Matrix3<f64>, to: &nalgebra::Matrix3<f64>| so3::log(&(to * from.transpose()));

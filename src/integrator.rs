@@ -16,10 +16,10 @@ use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive, Held};
 use crate::energy::{Energy, Powers};
 use crate::lateral::Disturbance;
-use crate::mesh::{Mesh, Origin};
+use crate::mesh::Mesh;
 use crate::plane::{Kept, Plane, Tip};
 use crate::pose::{Row, State};
-use crate::refine::Refiner;
+use crate::refine::{Change, Refiner, Share};
 use crate::rod::Rod;
 use crate::rosenbrock::{RODAS4, RODAS5P};
 use crate::runge_kutta::{ESDIRK4, RungeKutta, TR_BDF2};
@@ -42,17 +42,17 @@ const SAFETY: f64 = 0.9;
 /// Bounds of the change from one step to the next.
 const CHANGE: (f64, f64) = (0.2, 4.0);
 
-/// Estimated error that a step in space may have, over the tolerance.
-const SPACE_SHARE: f64 = 0.015;
+/// Estimated error that a step in space may have. Loosely followed, most of what is estimated are the fast waves that the
+/// method damps, and of these the tip feels little.
+const SPACE_SHARE: Share = Share { part: 0.026, power: 0.17 };
 /// The same in a plane.
-const PLANE_SHARE: f64 = 0.02;
-/// Estimated error of steps in the time that gravity or stiffness take to move the whole rod, over the tolerance: of those
-/// of order 2, and what energy may grow by is measured by it too.
-const SHARE_IN_TIME: f64 = 0.5;
+const PLANE_SHARE: Share = Share { part: 0.09, power: 0.15 };
+/// Estimated error of steps of order 2 in the time that gravity or stiffness take to move the whole rod, over the tolerance.
+const SIMPLE_SHARE: f64 = 1.9;
 /// Tolerance below which steps in a plane are of order 5.
 const FINE: f64 = 5e-5;
 /// How much longer steps of order 2 may be with every interval that one of order 4 has passed.
-const HOPE: f64 = 1.05;
+const HOPE: f64 = 1.2;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
@@ -73,9 +73,10 @@ const FADED: f64 = 0.01;
 /// The size that the disturbance had at first, rad; about the roundings of a rod in space.
 const ROUNDINGS: f64 = 1e-12;
 
-/// Energy that a step may gain, relative, over the error that goes with its time: those in space that follow the motion gain
-/// up to 4 times that, those that pass the end of a rotation vector 400 times and more.
-const GAIN: f64 = 12.0;
+/// Energy that a step may gain, relative, over the tolerance, in the time that gravity or stiffness take to move the whole
+/// rod: those in space that follow the motion gain up to twice that tolerance, those that pass the end of a rotation vector
+/// 200 times and more.
+const GAIN: f64 = 3.0;
 
 /// Kinetic energy up to which a rod rests, over that of motions as large as the rod with an amplitude of the tolerance.
 const AT_REST: f64 = 1e-6;
@@ -235,7 +236,7 @@ enum Event {
     /// One without an estimate of its error.
     Unestimated(f64),
     /// Other cells.
-    Cells(Vec<Origin>),
+    Cells(Change),
 }
 
 /// An interval as it was gone through: what a rod began with, the steps it took, the cells it had. All that follows from
@@ -310,7 +311,7 @@ pub struct Integrator {
     large: f64,
     /// Kinetic energy up to which it rests, over the large one.
     rest: f64,
-    /// Error in a second that goes with the tolerance, over the length.
+    /// The tolerance over the time in which gravity or stiffness move the whole rod, 1/s.
     drift: f64,
     energy: Energy,
     effort: Effort,
@@ -359,7 +360,8 @@ impl Integrator {
             let mut plane = Plane::new(&stepper.mesh, &stepper.rod, method);
             plane.reserve(most);
             let room = || Disturbance::new(most * stages);
-            let (pace, unwatched) = (pace(method.order as i32, PLANE_SHARE, SHORTEST_PLANE_STEP), (0.0, 0));
+            let (pace, unwatched) =
+                (pace(method.order as i32, PLANE_SHARE.of(tolerance), SHORTEST_PLANE_STEP), (0.0, 0));
             Box::new(Planar {
                 kept: plane.kept(),
                 before: (pace, room(), unwatched),
@@ -370,13 +372,11 @@ impl Integrator {
                 time,
             })
         });
-        let simple = pace(TR_BDF2.order, SPACE_SHARE, SHORTEST_STEP);
-        let pace = pace(ESDIRK4.order, SPACE_SHARE, SHORTEST_STEP);
+        let share = SPACE_SHARE.of(tolerance);
+        let [simple, pace] = [&TR_BDF2, &ESDIRK4].map(|method| pace(method.order, share, SHORTEST_STEP));
         let energy = Energy::of(&stepper.mesh, &stepper.rod, &stepper.state, &boundary.gravity);
         let effort = Effort::default();
-        let length = stepper.mesh.length();
-        let weight = stepper.rod.mass_per_length * length * boundary.gravity.norm();
-        let large = weight * length + stepper.rod.stiffness.max() / length;
+        let large = Energy::large(&stepper.rod, stepper.mesh.length(), &boundary.gravity);
         Self {
             in_plane: false,
             planar,
@@ -388,7 +388,7 @@ impl Integrator {
             simple,
             large,
             rest: AT_REST * tolerance * tolerance,
-            drift: SHARE_IN_TIME * tolerance / time,
+            drift: tolerance / time,
             energy,
             effort,
             state_before,
@@ -547,7 +547,7 @@ impl Integrator {
 
     fn note_cells(&mut self) {
         if let (Some(events), Some((refiner, _))) = (&mut self.events, &self.refiners) {
-            events.push(Event::Cells(refiner.origins().to_vec()));
+            events.push(Event::Cells(refiner.last_change()));
         }
     }
 
@@ -838,7 +838,7 @@ impl Integrator {
     fn pace_of(&mut self, method: &RungeKutta, dt: f64) -> &mut Pace {
         match method.order {
             2 => {
-                self.simple.allowed = self.drift * dt;
+                self.simple.allowed = SIMPLE_SHARE * self.drift * dt;
                 &mut self.simple
             }
             _ => &mut self.pace,
@@ -995,10 +995,10 @@ impl Integrator {
                     self.step(drive, Kind::Damped, time, *dt, MAX_HALVINGS)?;
                     time += dt;
                 }
-                Event::Cells(origins) => {
+                Event::Cells(change) => {
                     let Some((refiner, _)) = &mut self.refiners else { continue };
                     let now = drive(time).boundary;
-                    let changed = refiner.change_to(origins, &mut self.stepper, &now);
+                    let changed = refiner.change_to(change, &mut self.stepper, &now);
                     changed.map_err(|cause| Failed { time, step: 0.0, cause })?;
                     self.see_energy(&now.gravity);
                 }
@@ -1021,9 +1021,9 @@ impl Integrator {
                     self.energy = take_in_plane(plane, &at, *dt, true, &self.energy);
                     time += dt;
                 }
-                Event::Cells(origins) => {
+                Event::Cells(change) => {
                     let Some((refiner, _)) = &mut self.refiners else { continue };
-                    let changed = refiner.change_plane_to(origins, plane, &drive(time));
+                    let changed = refiner.change_plane_to(change, plane, &drive(time));
                     changed.map_err(|cause| Failed { time, step: 0.0, cause: singular(cause) })?;
                     self.energy = self.energy.now(&plane.energy());
                 }

@@ -652,7 +652,8 @@ impl Plane {
     }
 
     /// Exchanges the cells for those with these origins in them, and solves for the accelerations as [`Self::start`]. At
-    /// the points of the new cells the curvature is what the balance of moments asks for, and its rate what it was.
+    /// the points of the new cells the curvature is what the balance of moments asks for, if the energy that the rod then
+    /// has `fits`, else what it was; and its rate what it was. Tells which.
     ///
     /// # Errors
     /// [`Singular`] as of [`Self::start`]; the rod is as before.
@@ -662,16 +663,40 @@ impl Plane {
         origins: &[Origin],
         series: &Series,
         drive: &Drive,
-    ) -> Result<(), Singular> {
-        self.look(1.0, drive);
+        fits: impl Fn(&Energy) -> bool,
+    ) -> Result<bool, Singular> {
+        for balanced in [true, false] {
+            self.look(1.0, drive);
+            self.transfer(cells, origins, series, balanced);
+            self.exchange(cells);
+            let started = self.start(drive);
+            if started.is_ok() {
+                self.look(1.0, drive);
+                if !balanced || fits(&self.energy()) {
+                    self.next.resize(self.cells.len(), Points::default());
+                    return Ok(balanced);
+                }
+            }
+            self.exchange(cells);
+            self.stand(drive);
+            if let Err(singular) = started {
+                self.next.resize(self.cells.len(), Points::default());
+                return Err(singular);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The points on other cells, in `next`, of the rod as it is looked at.
+    fn transfer(&mut self, cells: &[mesh::Cell], origins: &[Origin], series: &Series, balanced: bool) {
         let [mut angle, mut rate, _] = self.fields[0].node.angle;
         self.next.clear();
-        for (origin, cell) in origins.iter().zip(cells.iter()) {
+        for (origin, cell) in origins.iter().zip(cells) {
             let mut strain = [Lane::default(); 2];
             match *origin {
                 Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
                 Origin::First(old) | Origin::Second(old) => {
-                    let missed = self.bending(old, series).missed();
+                    let missed = if balanced { self.bending(old, series).missed() } else { 0.0 };
                     for k in 0..self.mesh.rule.stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);
                         let through = self.mesh.rule.through(theta);
@@ -696,14 +721,6 @@ impl Plane {
             angle += cell.length * total(&self.rule.b, &strain[0]);
             rate += cell.length * total(&self.rule.b, &strain[1]);
         }
-        self.exchange(cells);
-        let started = self.start(drive);
-        if started.is_err() {
-            self.exchange(cells);
-            self.stand(drive);
-        }
-        self.next.resize(self.cells.len(), Points::default());
-        started
     }
 
     /// Exchanges the cells and the points on them.
@@ -733,6 +750,11 @@ impl Plane {
             lever: size(from_fn(|i| self.tip.position[i] - field.node.position[i])),
             turn: (next.angle[0] - field.node.angle[0]).abs(),
         }
+    }
+
+    /// As [`Energy::large`], of what acts now.
+    pub(crate) fn large(&self) -> f64 {
+        Energy::large(&self.rod, self.mesh.length(), &self.looked_at.gravity)
     }
 
     /// EI about the normal of the plane.

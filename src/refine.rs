@@ -22,9 +22,9 @@
 //!
 //! with the largest curvatures in the cell. It falls as h^2s over the rod, as the error does.
 //!
-//! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; two
-//! cells are joined by their mean square best approximation. Both leave the tip and its velocity where they are, to the
-//! order of e. Still a change raises some waves, and is the better for being made in time: cells are halved before they have
+//! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; where
+//! that would bring much energy, in a whip, they are what they were. Two cells are joined by their mean square best
+//! approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change raises some waves, and is the better for being made in time: cells are halved before they have
 //! used up what the tolerance allows, and joined long after; a step that leaves too little is taken anew on finer ones.
 
 // J is a matrix
@@ -32,12 +32,13 @@
 
 use crate::archive::archived;
 use crate::boundary::{Boundary, Drive};
+use crate::energy::Energy;
 use crate::mesh::{Cell, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::plane::{Bending, Plane};
 use crate::pose::{Section, State};
 use crate::rod::Rod;
 use crate::so3;
-use crate::stepper::{Diverged, Report, Stepper};
+use crate::stepper::{Diverged, Reason, Report, Stepper};
 use crate::sweep::{Singular, larger};
 use nalgebra::Vector3;
 
@@ -47,14 +48,25 @@ type Vec3 = Vector3<f64>;
 /// and one that turns, on 1 to 24 cells; 10 to 20 times that where all error is in a thin layer at the clamp, and less
 /// than it for the small waves of a wire below 1e-6.
 const CALIBRATION: f64 = 2.0;
-/// Part of the tolerance that the cells may use up before they are halved. With a tenth a hair that whips raises more waves
-/// by its changes than it is the more exact.
-const SHARE: f64 = 0.25;
-/// Part of that which a pair of cells must keep below once joined.
-const JOINED: f64 = 0.05;
-/// Times what a cell may use up at which the step that has brought it there is taken back. A blow or a jerk to a hanging
-/// cord costs at most the tolerance then, and up to 5 times that with a factor of 10.
-const REFUSED: f64 = 2.0;
+/// Part of the tolerance that the cells may use up before those with more than their share of it are halved. With a tenth a
+/// hair that whips raises more waves by its changes than it is the more exact.
+const SHARE: f64 = 0.17;
+/// Part of its share that a pair of cells must keep below once joined: the waves that a change raises count the more, the
+/// less may be amiss.
+const JOINED: Share = Share { part: 0.22, power: 0.25 };
+/// Times what the cells may use up at which the step that has brought them there is taken back.
+const REFUSED: f64 = 2.5;
+/// Energy that cells bring which leave as much less of an error, relative, over that: up to 3 times it where they are due,
+/// 100 times and more in a whip.
+const BROUGHT: f64 = 4.0;
+/// Energy, relative, with which no cells are taken at leisure: that of folded ones, whose rates are beyond all bounds.
+const WILD: f64 = 0.1;
+/// The same where a step needs them: a rod that is wound up at once must have some that bring 5 times what it has.
+const WILD_AT_NEED: f64 = 10.0;
+/// How much more what is missed of the bending of a rod at rest counts than of one in motion: there one sees the cells change.
+const AT_REST: f64 = 10.0;
+/// Tolerance beyond which shares grow no more: a rod need not be followed, but no energy may come of it.
+const ROUGH: f64 = 1e-2;
 /// Calls without a change after one: the waves that it has raised are to fade.
 const REST: u32 = 4;
 /// Part of the error of a cell that is remembered at the next call, lest cells that have a moment's rest be joined.
@@ -66,6 +78,40 @@ const MOST_TURN: [f64; 2] = [4.0, 2.0];
 const MOST_HALVINGS: u32 = 12;
 /// Iterations for the rotation vectors of a cell of given curvature; each gains the turn of the cell in rad, or so.
 const MOST_ITERATIONS: usize = 30;
+
+/// A part of a tolerance, that is another of another tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Share {
+    /// Of 1e-3.
+    pub(crate) part: f64,
+    /// Power of the tolerance that it grows with.
+    pub(crate) power: f64,
+}
+
+impl Share {
+    /// Of this tolerance.
+    pub(crate) fn of(self, tolerance: f64) -> f64 {
+        self.part * (tolerance.min(ROUGH) / 1e-3).powf(self.power)
+    }
+}
+
+/// What decides on the curvatures of new cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum By {
+    /// The energy that they bring, and that is this at most, relative; in a plane halved cells go on without any.
+    Energy(f64),
+    /// Whether they are to be those that the moments ask for.
+    Order(bool),
+}
+
+/// A change of the cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// Of which the new ones come.
+    origins: Vec<Origin>,
+    /// Whether their curvatures are those that the moments ask for.
+    balanced: bool,
+}
 
 /// What the cells of a rod contribute to the error of its tip, and which they ought to be.
 #[derive(Clone, Debug)]
@@ -89,12 +135,13 @@ pub struct Refiner {
     /// The next cells, and those of which they come.
     cells: Vec<Cell>,
     origins: Vec<Origin>,
+    balanced: bool,
     series: Series,
     kept: Vec<f64>,
 }
 
 archived!(Refiner { waited, lately } but {
-    tolerance, most_cells, coarsest, rule, errors, turns, seen, places, cells, origins, series, kept
+    tolerance, most_cells, coarsest, rule, errors, turns, seen, places, cells, origins, balanced, series, kept
 });
 
 impl Refiner {
@@ -121,6 +168,7 @@ impl Refiner {
             places: Vec::with_capacity(most_cells),
             cells: Vec::with_capacity(most_cells),
             origins: Vec::with_capacity(most_cells),
+            balanced: true,
         }
     }
 
@@ -153,27 +201,27 @@ impl Refiner {
         self.most_cells
     }
 
-    /// Of which the cells come since the last change.
-    pub fn origins(&self) -> &[Origin] {
-        &self.origins
+    /// The last change.
+    pub fn last_change(&self) -> Change {
+        Change { origins: self.origins.clone(), balanced: self.balanced }
     }
 
-    /// Changes the cells to those with these `origins`, as [`adapt`](Self::adapt) or [`refuse`](Self::refuse) once did.
+    /// Changes the cells as [`adapt`](Self::adapt) or [`refuse`](Self::refuse) once did.
     ///
     /// # Errors
     /// [`Diverged`] as of [`Self::adapt`].
-    pub fn change_to(&mut self, origins: &[Origin], stepper: &mut Stepper, now: &Boundary) -> Result<(), Diverged> {
-        self.set_cells(origins, &stepper.mesh);
-        self.change(stepper, now)
+    pub fn change_to(&mut self, change: &Change, stepper: &mut Stepper, now: &Boundary) -> Result<(), Diverged> {
+        self.set_cells(&change.origins, &stepper.mesh);
+        self.change(stepper, now, By::Order(change.balanced))
     }
 
     /// The same of a rod in a plane.
     ///
     /// # Errors
     /// [`Singular`] as of [`Self::adapt_plane`].
-    pub fn change_plane_to(&mut self, origins: &[Origin], plane: &mut Plane, now: &Drive) -> Result<(), Singular> {
-        self.set_cells(origins, plane.mesh());
-        self.change_plane(plane, now)
+    pub fn change_plane_to(&mut self, change: &Change, plane: &mut Plane, now: &Drive) -> Result<(), Singular> {
+        self.set_cells(&change.origins, plane.mesh());
+        self.change_plane(plane, now, By::Order(change.balanced))
     }
 
     fn set_cells(&mut self, origins: &[Origin], mesh: &Mesh) {
@@ -190,13 +238,14 @@ impl Refiner {
 
     /// Estimated error of the tip's position, over the length, that comes of the present cells.
     pub fn estimate_space(&mut self, stepper: &Stepper) -> f64 {
-        let Stepper { mesh, rod, state, .. } = stepper;
-        self.estimate_state(mesh, rod, state)
+        self.estimate_state(stepper, &stepper.state, 1.0)
     }
 
-    fn estimate_state(&mut self, mesh: &Mesh, rod: &Rod, state: &State) -> f64 {
+    /// Of any state of the rod; what is missed `counts` so many times.
+    fn estimate_state(&mut self, stepper: &Stepper, state: &State, counts: f64) -> f64 {
+        let Stepper { mesh, rod, .. } = stepper;
         let stages = mesh.rule.stages;
-        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), |series, j| {
+        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), counts, |series, j| {
             let (node, next) = (&state.nodes[j], &state.nodes[j + 1]);
             let at_points = bend_at_points(rod, state, stages, j);
             let at_node = bend(rod, node);
@@ -224,12 +273,18 @@ impl Refiner {
         if self.seen == Some(plane.looks()) {
             return self.estimated();
         }
-        let error = self.estimate(plane.mesh(), plane.stiffness(), |series, j| plane.bending(j, series));
+        let error = self.estimate(plane.mesh(), plane.stiffness(), 1.0, |series, j| plane.bending(j, series));
         self.seen = Some(plane.looks());
         error
     }
 
-    fn estimate(&mut self, mesh: &Mesh, stiffness: f64, bending: impl Fn(&Series, usize) -> Bending) -> f64 {
+    fn estimate(
+        &mut self,
+        mesh: &Mesh,
+        stiffness: f64,
+        counts: f64,
+        bending: impl Fn(&Series, usize) -> Bending,
+    ) -> f64 {
         let (length, stages) = (mesh.length(), mesh.rule.stages as i32);
         self.seen = None;
         self.errors.clear();
@@ -244,7 +299,7 @@ impl Refiner {
             // nothing is missed of what is not bent
             let bent = if missed == 0.0 { 0.0 } else { missed * arm / larger(at_points, at_nodes) };
             let turned = self.series.remainder * (h * curvature).powi(2 * stages);
-            self.errors.push(h / length * (CALIBRATION * bent + turned));
+            self.errors.push(h / length * (CALIBRATION * counts * bent + turned));
             self.turns.push(turn);
         }
         self.estimated()
@@ -271,7 +326,9 @@ impl Refiner {
     fn plan(&mut self, mesh: &Mesh, joins: bool) -> bool {
         let count = mesh.cells.len();
         self.find_places(mesh);
-        let allowed = self.allowed(count);
+        let allowed = self.allowed() / count as f64;
+        let enough = self.lately.iter().sum::<f64>() <= self.allowed();
+        let below = JOINED.of(self.tolerance) * allowed;
         // of a cell twice as long
         let growth = 4f64.powi(self.rule.stages as i32);
         let mut room = self.most_cells - count.min(self.most_cells);
@@ -280,7 +337,8 @@ impl Refiner {
         let mut j = 0;
         while j < count {
             let (error, (root, level, start)) = (self.lately[j], self.places[j]);
-            let halve = !(error <= allowed && self.turns[j] < MOST_TURN[0]) && level < MOST_HALVINGS && room > 0;
+            let halve =
+                !((enough || error <= allowed) && self.turns[j] < MOST_TURN[0]) && level < MOST_HALVINGS && room > 0;
             let width = 1 << (MOST_HALVINGS - level);
             let joined = match self.lately.get(j + 1) {
                 Some(next) if joins && level > 0 && start % (2 * width) == 0 => {
@@ -288,7 +346,7 @@ impl Refiner {
                     let turn = self.turns[j] + self.turns[j + 1];
                     let error = growth * (error + next);
                     let pair = other == (root, level, start + width) && turn < MOST_TURN[1];
-                    (pair && error <= JOINED * allowed).then_some(error)
+                    (pair && error <= below).then_some(error)
                 }
                 _ => None,
             };
@@ -334,14 +392,14 @@ impl Refiner {
     /// consistent with it afterwards, as after [`Stepper::accelerate`], and [`Stepper::previous`] is lost.
     ///
     /// # Errors
-    /// [`Diverged`] if the equations of a cell are singular; the rod is as before.
+    /// [`Diverged`] if the equations of a cell are singular, or new cells would have much more energy; the rod is as before.
     pub fn adapt(&mut self, stepper: &mut Stepper, boundary: &Boundary, joins: bool) -> Result<bool, Diverged> {
         self.estimate_space(stepper);
         let unfit = stepper.rod.is_extensible() || boundary.holds_positions();
         if unfit || !self.due(&stepper.mesh, joins) {
             return Ok(false);
         }
-        self.change(stepper, boundary)?;
+        self.change(stepper, boundary, By::Energy(WILD))?;
         Ok(true)
     }
 
@@ -355,7 +413,7 @@ impl Refiner {
         if !self.due(plane.mesh(), joins) {
             return Ok(false);
         }
-        self.change_plane(plane, drive)?;
+        self.change_plane(plane, drive, By::Energy(WILD))?;
         Ok(true)
     }
 
@@ -378,7 +436,7 @@ impl Refiner {
                 return Ok(changed);
             }
             self.kept.fill(0.0);
-            self.change(stepper, boundary)?;
+            self.change(stepper, boundary, By::Energy(WILD))?;
             changed = true;
         }
     }
@@ -390,12 +448,11 @@ impl Refiner {
     /// # Errors
     /// [`Diverged`] as of [`Self::adapt`]; the attempt is lost.
     pub fn refuse(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Diverged> {
-        let Stepper { mesh, rod, .. } = &*stepper;
-        self.estimate_state(mesh, rod, stepper.attempted());
+        self.estimate_state(stepper, stepper.attempted(), 1.0);
         if !self.refuses(&stepper.mesh) {
             return Ok(false);
         }
-        self.change(stepper, boundary)?;
+        self.change(stepper, boundary, By::Energy(WILD_AT_NEED))?;
         Ok(true)
     }
 
@@ -409,27 +466,37 @@ impl Refiner {
             return Ok(false);
         }
         plane.take_back();
-        self.change_plane(plane, drive)?;
+        self.change_plane(plane, drive, By::Energy(WILD))?;
         Ok(true)
     }
 
     fn refuses(&mut self, mesh: &Mesh) -> bool {
-        let most = REFUSED * self.allowed(mesh.cells.len());
-        let fit = |(error, turn): (&f64, &f64)| *error <= most && *turn < MOST_TURN[0];
-        if self.errors.iter().zip(&self.turns).all(fit) {
+        if self.estimated() <= REFUSED * self.allowed() && self.turns.iter().all(|turn| *turn < MOST_TURN[0]) {
             return false;
         }
         self.remember(mesh.cells.len());
         self.plan(mesh, false)
     }
 
-    /// The error that each of so many cells may have.
-    fn allowed(&self, cells: usize) -> f64 {
-        SHARE * self.tolerance / cells as f64
+    /// The error that the cells may have, all together.
+    fn allowed(&self) -> f64 {
+        SHARE * self.tolerance
     }
 
-    fn change_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<(), Singular> {
-        plane.remesh(&mut self.cells, &self.origins, &self.series, drive)?;
+    /// Energy, relative, that new cells may bring with the curvatures that the moments ask for.
+    fn most_balanced(&self) -> f64 {
+        larger(self.allowed(), (BROUGHT * self.estimated()).min(SHARE * ROUGH))
+    }
+
+    fn change_plane(&mut self, plane: &mut Plane, drive: &Drive, by: By) -> Result<(), Singular> {
+        plane.look(1.0, drive);
+        let before = plane.energy();
+        let most = self.most_balanced() * (plane.large() + before.kinetic + before.elastic);
+        let fits = |after: &Energy| match by {
+            By::Energy(_) => after.total() - before.total() <= most,
+            By::Order(balanced) => balanced,
+        };
+        self.balanced = plane.remesh(&mut self.cells, &self.origins, &self.series, drive, fits)?;
         self.changed();
         Ok(())
     }
@@ -447,8 +514,8 @@ impl Refiner {
             match report {
                 Ok(report) => {
                     iterations += report.iterations;
-                    self.estimate_space(stepper);
-                    self.remember(count);
+                    self.estimate_state(stepper, &stepper.state, AT_REST);
+                    self.lately.clone_from(&self.errors);
                     if unfit || !self.plan(&stepper.mesh, false) {
                         return Ok(Report { iterations, ..report });
                     }
@@ -467,17 +534,40 @@ impl Refiner {
             }
             // not those that it did not get to: loads go on from them
             let reached = stepper.state.boundary;
-            self.change(stepper, &reached)?;
+            self.change(stepper, &reached, By::Order(true))?;
         }
     }
 
-    fn change(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<(), Diverged> {
+    fn change(&mut self, stepper: &mut Stepper, boundary: &Boundary, by: By) -> Result<(), Diverged> {
+        let Stepper { mesh, rod, state, .. } = &*stepper;
+        let gravity = &boundary.gravity;
+        let energy = Energy::of(mesh, rod, state, gravity);
+        let scale = Energy::large(rod, mesh.length(), gravity) + energy.kinetic + energy.elastic;
+        let most = self.most_balanced();
         let Self { cells, origins, series, .. } = self;
         let (mesh, rod, before, state) = stepper.remesh(cells);
-        transfer((cells, before), (origins, series), (mesh, state), rod);
-        if let Err(diverged) = stepper.accelerate(boundary) {
+        let mut gain = 0.0;
+        for balanced in [true, false] {
+            self.balanced = balanced;
+            transfer((cells, before), (origins, series), (mesh, state), rod, balanced);
+            gain = (Energy::of(mesh, rod, state, gravity).total() - energy.total()) / scale;
+            let fits = match by {
+                By::Energy(_) => gain <= most,
+                By::Order(order) => balanced == order,
+            };
+            if fits {
+                break;
+            }
+        }
+        let started = match by {
+            By::Energy(wild) if gain.is_nan() || gain > wild => {
+                Err(Diverged { iterations: 0, residual: gain, reason: Reason::Elsewhere })
+            }
+            _ => stepper.accelerate(boundary),
+        };
+        if started.is_err() {
             stepper.undo_remesh(cells);
-            return Err(diverged);
+            return started;
         }
         self.changed();
         Ok(())
@@ -589,13 +679,14 @@ fn spin(omega: &Vec3, phi: &Vec3, phi_t: &Vec3) -> Vec3 {
     so3::right_jacobian(phi) * phi_t + so3::exp(phi).tr_mul(omega)
 }
 
-/// Puts the rod on another mesh: at the points of new cells its curvature is what the balance of moments asks for, and
-/// the rate of that what it was. All but the accelerations follow.
+/// Puts the rod on another mesh: at the points of new cells its curvature is what the balance of moments asks for if it is
+/// to be `balanced`, else what it was, and the rate of that what it was. All but the accelerations follow.
 fn transfer(
     before: (&[Cell], &State),
     (origins, series): (&[Origin], &Series),
     (mesh, state): (&Mesh, &mut State),
     rod: &Rod,
+    balanced: bool,
 ) {
     let (rule, stages, old) = (&mesh.rule, mesh.rule.stages, before.1);
     (state.boundary, state.dt, state.scheme, state.row) = (old.boundary, 0.0, old.scheme, old.row);
@@ -619,13 +710,17 @@ fn transfer(
                     }
                     let (_, theta) = origin.at(rule.c[k]);
                     let through = rule.through(theta);
+                    let went_on = (sum(&through, &shape.kappa), sum(&through, &shape.kappa_t));
+                    if !balanced {
+                        return went_on;
+                    }
                     // at a release moments are balanced that have not bent the rod yet
                     let bent = |kappa: &Vec3| (kappa - before.0[first].kappa_rest).norm();
                     let most = shape.kappa[..stages].iter().map(bent).fold(0.0, larger);
                     let balanced = bend(rod, &old.nodes[first]);
                     let missed = balanced - sum(&series.start, &bend_at_points(rod, old, stages, first));
                     let beside = missed * (rule.beside(theta) * (most / missed.norm()).min(1.0));
-                    (sum(&through, &shape.kappa) + beside, sum(&through, &shape.kappa_t))
+                    (went_on.0 + beside, went_on.1)
                 };
                 Shape::bent(rule, mesh.cells[j].length, lane(stages, |k| at(k).0), lane(stages, |k| at(k).1))
             }

@@ -34,7 +34,7 @@ const TOLERANCE: f64 = 1e-8;
 const ROUNDINGS: f64 = 256.0;
 
 /// Part of what a stage need not resolve that its iteration may leave: the errors of many steps point one way and add up.
-const PART_LEFT: f64 = 1e-2;
+const PART_LEFT: f64 = 0.1;
 /// What no iteration of a stage need leave less than.
 const FINEST: f64 = 1e-13;
 /// Part of an increment of Newton's own that it leaves at most: what the Jacobian leaves out, or its square.

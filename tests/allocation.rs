@@ -194,7 +194,7 @@ fn steps_after_a_load_allocate_nothing() {
     // cells are halved, and the plane is left, in a unit that was made for a state of before that
     let parameters = Parameters { tolerance: 1e-4, ..Parameters::default() };
     let mut unit = Some(Box::new(Unit::new(&parameters, &Inputs::default(), None).unwrap()));
-    let pushed = Inputs { tip_force: Vector3::new(0.0, 0.1, 0.0), ..Inputs::default() };
+    let pushed = Inputs { tip_force: Vector3::new(0.0, 1.0, 0.0), ..Inputs::default() };
     let still = Inputs::default();
     let run = |unit: &mut Option<Box<Unit>>| {
         let unit = unit.as_mut().unwrap();

@@ -303,9 +303,19 @@ impl Parameters {
     /// # Errors
     /// [`Error::NotAllowed`] if a cell would turn further than its rotation vector reaches.
     fn mesh(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
-        let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
         let (shape, more) = (&self.rest_shape, &self.rest_curvature);
         let turn = shape.turn(self.length, more);
+        let coiled = turn / COARSEST_TURN;
+        let stages = match self.stages {
+            // what the rest shape asks for is more than enough then
+            0 if self.cells == 0
+                && tolerance > ROUGH
+                && coiled > self.cells_enough(rod, boundary, tolerance, LIKELY) =>
+            {
+                3
+            }
+            _ => self.most_stages(),
+        };
         if self.cells > 0 {
             let mesh = shape.mesh(self.length, more, self.cells as usize, f64::INFINITY, stages);
             let not_allowed = |allowed| Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
@@ -324,12 +334,17 @@ impl Parameters {
             return Ok((in_cells(cells.max(turn) as usize), None));
         }
         let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
-        let coarsest = in_cells((AT_REST * likely).max(turn / COARSEST_TURN).ceil() as usize);
+        let coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize);
         let most = likely.max(turn).max(coarsest.cells.len() as f64);
         let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
         let cells = if self.tip_mode == 1 { self.length / self.longest_cell(rod, boundary, tolerance) } else { likely };
         Ok((refiner.start(cells as usize), Some(refiner)))
+    }
+
+    /// Gauss points in a cell, as given or as many as there may be.
+    fn most_stages(&self) -> usize {
+        if self.stages == 0 { MAX_STAGES } else { self.stages as usize }
     }
 
     /// Equal cells that are right to `tolerance`: `part` of the lengths in which loads bend the rod, at the tolerance
@@ -347,8 +362,7 @@ impl Parameters {
         let softest = rod.stiffness.min();
         let bends = self.length * (load / softest).cbrt();
         let wound = boundary.tip_moment.norm() * self.length / softest;
-        let stages = if self.stages == 0 { MAX_STAGES } else { self.stages as usize };
-        let order = 2.0 * stages as f64;
+        let order = 2.0 * self.most_stages() as f64;
         let few = 2.0 * (1e-3 / tolerance).powf(1.0 / order);
         let cells = part * bends * (reference / tolerance).powf(grows / order);
         cells.max(wound).max(few).ceil().clamp(1.0, MAX_AUTOMATIC_CELLS)
@@ -460,8 +474,8 @@ struct Cells {
 
 /// Measured on a rope of seven such lengths, five cells of four points are right to 3e-4.
 const ENOUGH: Cells = Cells { part: 0.7, reference: 1e-3, grows: 1.0 };
-/// Equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent.
-const LIKELY: Cells = Cells { part: 0.3, reference: 1e-2, grows: 1.8 };
+/// Two thirds of the equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent.
+const LIKELY: Cells = Cells { part: 0.2, reference: 1e-2, grows: 1.8 };
 /// Fewest cells of a rod between two ends: it may turn by more than a whole turn on its way, and a cell by less than one.
 const CELLS_BETWEEN_ENDS: f64 = 4.0;
 /// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
@@ -476,6 +490,8 @@ const ROOM: f64 = 4.0;
 const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
+/// Tolerance beyond which cells of three points do where that turn sets their number, at two thirds of the cost.
+const ROUGH: f64 = 3e-4;
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
 /// motion.
 const MAX_CELL_TURN: f64 = 3.0;
