@@ -24,8 +24,9 @@
 //!
 //! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; where
 //! that would bring much energy, in a whip, they are what they were. Two cells are joined by their mean square best
-//! approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change raises some waves, and is the better for being made in time: cells are halved before they have
-//! used up what the tolerance allows, and joined long after; a step that leaves too little is taken anew on finer ones.
+//! approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change raises some
+//! waves, and is the better for being made in time: cells are halved before they have used up what the tolerance allows,
+//! and joined long after; a step that leaves too little is taken anew on finer ones.
 
 // J is a matrix
 #![allow(non_snake_case)]

@@ -305,17 +305,7 @@ impl Parameters {
     fn mesh(&self, rod: &Rod, boundary: &Boundary, tolerance: f64) -> Result<(Mesh, Option<Refiner>), Error> {
         let (shape, more) = (&self.rest_shape, &self.rest_curvature);
         let turn = shape.turn(self.length, more);
-        let coiled = turn / COARSEST_TURN;
-        let stages = match self.stages {
-            // what the rest shape asks for is more than enough then
-            0 if self.cells == 0
-                && tolerance > ROUGH
-                && coiled > self.cells_enough(rod, boundary, tolerance, LIKELY) =>
-            {
-                3
-            }
-            _ => self.most_stages(),
-        };
+        let stages = self.most_stages();
         if self.cells > 0 {
             let mesh = shape.mesh(self.length, more, self.cells as usize, f64::INFINITY, stages);
             let not_allowed = |allowed| Err(Error::NotAllowed { name: "cells", value: self.cells.into(), allowed });
@@ -327,14 +317,17 @@ impl Parameters {
             }
             return Ok((mesh, None));
         }
-        let in_cells = |cells: usize| shape.mesh(self.length, more, cells, COARSEST_TURN, stages);
+        let in_cells = |cells: usize, stages: usize| shape.mesh(self.length, more, cells, COARSEST_TURN, stages);
         if self.extensible || self.step > 0.0 || self.quasi_static {
             let cells = self.cells_enough(rod, boundary, tolerance, ENOUGH);
             let cells = if self.tip_mode == 1 { cells.max(CELLS_BETWEEN_ENDS) } else { cells };
-            return Ok((in_cells(cells.max(turn) as usize), None));
+            return Ok((in_cells(cells.max(turn) as usize, stages), None));
         }
         let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
-        let coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize);
+        let coiled = turn / COARSEST_TURN;
+        // what the rest shape asks for is more than enough then
+        let few = self.stages == 0 && self.tip_mode == 0 && tolerance > ROUGH && coiled > likely;
+        let coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize, if few { FEW_STAGES } else { stages });
         let most = likely.max(turn).max(coarsest.cells.len() as f64);
         let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
         // the motion to come is not seen at the start
@@ -490,8 +483,10 @@ const ROOM: f64 = 4.0;
 const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
-/// Tolerance beyond which cells of three points do where that turn sets their number, at two thirds of the cost.
+/// Tolerance beyond which cells of fewer points do where that turn sets their number, at half the cost.
 const ROUGH: f64 = 3e-4;
+/// Their points.
+const FEW_STAGES: usize = 3;
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
 /// motion.
 const MAX_CELL_TURN: f64 = 3.0;
