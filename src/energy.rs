@@ -61,6 +61,11 @@ impl Energy {
         rod.mass_per_length * length * gravity.norm() * length + rod.stiffness.max() / length
     }
 
+    /// What its changes are small beside, where gravity and bending can give the `large` one, J.
+    pub fn scale(&self, large: f64) -> f64 {
+        large + self.kinetic + self.elastic
+    }
+
     /// Energies after a step from `old` to `new`, with the works and losses of the step added.
     pub fn after(&self, mesh: &Mesh, rod: &Rod, old: &State, new: &State, boundary: &Boundary) -> Self {
         let turn = |from: &nalgebra::Matrix3<f64>, to: &nalgebra::Matrix3<f64>| so3::log(&(to * from.transpose()));

@@ -31,10 +31,13 @@ type Vec3 = Vector3<f64>;
 
 /// Most steps chosen for an interval, in space.
 const MAX_CHOSEN_STEPS: f64 = 1000.0;
-/// The same in a plane, where they cost so little: seconds on the cells of a rod that whips.
-const MAX_PLANE_STEPS: f64 = 1e5;
+/// The same in a plane, those that are refused among them, where they cost so little: seconds on the cells of a rod that
+/// whips.
+const MAX_PLANE_STEPS: u32 = 100_000;
 /// Length of the next step over one that Newton has lost.
 const LOST: f64 = 0.3;
+/// The shortest step of implicit Euler over what was to be the shortest one.
+const SHORTEST_FALL: f64 = 1e-3;
 /// Halvings of a step before it is given up.
 const MAX_HALVINGS: u32 = 12;
 /// Part of the step that the estimate would allow which is taken, so that few are refused.
@@ -76,7 +79,7 @@ const ROUNDINGS: f64 = 1e-12;
 /// Energy that a step may gain, relative, over the tolerance, in the time that gravity or stiffness take to move the whole
 /// rod: those in space that follow the motion gain up to twice that tolerance, those that pass the end of a rotation vector
 /// 200 times and more.
-const GAIN: f64 = 3.0;
+const GAIN: f64 = 2.0;
 
 /// Kinetic energy up to which a rod rests, over that of motions as large as the rod with an amplitude of the tolerance.
 const AT_REST: f64 = 1e-6;
@@ -625,10 +628,10 @@ impl Integrator {
         if self.effort.steps > 0 {
             self.adapt_in_plane(&mut planar, &begin);
         }
-        let shortest = planar.pace.shortest.max(duration / MAX_PLANE_STEPS);
-        let (mut time, mut refuses) = (0.0, true);
+        let (mut time, mut refuses, mut attempts) = (0.0, true, 0);
         while time < duration && self.in_plane {
-            let (dt, last) = Pace { shortest, ..planar.pace }.step(duration - time);
+            let (dt, last) = planar.pace.step(duration - time);
+            attempts += 1;
             let at = |since: f64| drive(time + since);
             match self.attempt_in_plane(&mut planar, &at, dt, (works, refuses)) {
                 Outcome::Taken => {}
@@ -636,7 +639,7 @@ impl Integrator {
                     refuses = changed;
                     continue;
                 }
-                Outcome::TooLong if dt > shortest => continue,
+                Outcome::TooLong if dt > planar.pace.shortest && attempts < MAX_PLANE_STEPS => continue,
                 Outcome::TooLong => {
                     write(&mut planar.plane, &mut self.stepper);
                     self.in_plane = false;
@@ -765,14 +768,7 @@ impl Integrator {
                 Outcome::TooLong if simple || dt > shortest => continue,
                 Outcome::TooLong => {
                     self.pace.next = shortest;
-                    // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
-                    while self.step(drive, Kind::Falling, time, dt, MAX_HALVINGS).is_err() {
-                        if dt == rest {
-                            self.step(drive, Kind::Damped, time, dt, 0)?;
-                            break;
-                        }
-                        dt = (2.0 * dt).min(rest);
-                    }
+                    dt = self.fall(drive, time, dt, rest)?;
                 }
             }
             time = if dt == rest { duration } else { time + dt };
@@ -781,6 +777,24 @@ impl Integrator {
             }
         }
         Ok(())
+    }
+
+    /// Takes a step of implicit Euler from `time` on where one of `shortest` s is not good enough otherwise, in an interval of
+    /// which `rest` s are left; returns how long it was.
+    fn fall(&mut self, drive: &impl Fn(f64) -> Drive, time: f64, shortest: f64, rest: f64) -> Result<f64, Failed> {
+        let (mut dt, mut kind) = (shortest, Kind::Falling);
+        loop {
+            let Err(failed) = self.step(drive, kind, time, dt, MAX_HALVINGS) else { return Ok(dt) };
+            self.effort.iterated(failed.cause.iterations);
+            self.effort.retried();
+            match kind {
+                // a cell bent further than its rotation vector reaches comes back in a long step, and in no short one
+                Kind::Falling if dt < rest => dt = (2.0 * dt).min(rest),
+                Kind::Falling => kind = Kind::Damped,
+                _ if dt <= shortest * SHORTEST_FALL => return Err(failed),
+                _ => dt *= 0.5,
+            }
+        }
     }
 
     /// Takes a step of `dt` s in space from `time` on, if it is good enough; one that `must` be is, as long as no energy
@@ -1024,7 +1038,7 @@ impl Integrator {
                 Event::Cells(change) => {
                     let Some((refiner, _)) = &mut self.refiners else { continue };
                     let changed = refiner.change_plane_to(change, plane, &drive(time));
-                    changed.map_err(|cause| Failed { time, step: 0.0, cause: singular(cause) })?;
+                    changed.map_err(|cause| Failed { time, step: 0.0, cause })?;
                     self.energy = self.energy.now(&plane.energy());
                 }
                 Event::InSpace(..) | Event::Unestimated(_) => {}
@@ -1180,7 +1194,7 @@ impl Course {
 /// What a step has added to the energy beyond the work that was done in it, relative to it, or to the `large` one, J, that
 /// gravity and bending can give.
 fn gain(before: &Energy, after: &Energy, large: f64) -> f64 {
-    (after.residual(before) - before.residual(before)) / (large + after.kinetic + after.elastic)
+    (after.residual(before) - before.residual(before)) / after.scale(large)
 }
 
 /// What is kept before an interval, so that a step that fails is undone, is all that decides what follows, for a rod that

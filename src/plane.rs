@@ -410,6 +410,8 @@ pub(crate) struct Bending {
     pub(crate) at_nodes: f64,
     /// Largest |κ|, 1/m.
     pub(crate) curvature: f64,
+    /// What of the tangent in the middle is across κ.
+    pub(crate) tangent: Vec3,
     /// Largest |n|, N.
     pub(crate) force: f64,
     /// Distance of the tip, m.
@@ -651,40 +653,32 @@ impl Plane {
         &self.mesh
     }
 
-    /// Exchanges the cells for those with these origins in them, and solves for the accelerations as [`Self::start`]. At
-    /// the points of the new cells the curvature is what the balance of moments asks for, if the energy that the rod then
-    /// has `fits`, else what it was; and its rate what it was. Tells which.
+    /// Exchanges the cells for those with these origins in them, and solves for the accelerations as [`Self::start`], if the
+    /// energy that the rod then has `fits`; tells whether. At the points of the new cells the curvature is what the balance
+    /// of moments asks for if it is to be `balanced`, else what it was; and its rate what it was. The rod is one looked at.
     ///
     /// # Errors
     /// [`Singular`] as of [`Self::start`]; the rod is as before.
     pub(crate) fn remesh(
         &mut self,
         cells: &mut Vec<mesh::Cell>,
-        origins: &[Origin],
-        series: &Series,
+        (origins, series): (&[Origin], &Series),
         drive: &Drive,
-        fits: impl Fn(&Energy) -> bool,
+        balanced: bool,
+        fits: impl FnOnce(&Energy) -> bool,
     ) -> Result<bool, Singular> {
-        for balanced in [true, false] {
+        self.transfer(cells, origins, series, balanced);
+        self.exchange(cells);
+        let taken = self.start(drive).map(|()| {
             self.look(1.0, drive);
-            self.transfer(cells, origins, series, balanced);
-            self.exchange(cells);
-            let started = self.start(drive);
-            if started.is_ok() {
-                self.look(1.0, drive);
-                if !balanced || fits(&self.energy()) {
-                    self.next.resize(self.cells.len(), Points::default());
-                    return Ok(balanced);
-                }
-            }
+            fits(&self.energy())
+        });
+        if taken != Ok(true) {
             self.exchange(cells);
             self.stand(drive);
-            if let Err(singular) = started {
-                self.next.resize(self.cells.len(), Points::default());
-                return Err(singular);
-            }
         }
-        Ok(false)
+        self.next.resize(self.cells.len(), Points::default());
+        taken
     }
 
     /// The points on other cells, in `next`, of the rod as it is looked at.
@@ -746,6 +740,7 @@ impl Plane {
             at_points: largest(&points),
             at_nodes: largest(&[field.node.moment, next.moment]) * per_stiffness,
             curvature: largest(&field.strain[0]),
+            tangent: Vec3::new(field.cos[self.mesh.rule.stages / 2], field.sin[self.mesh.rule.stages / 2], 0.0),
             force: size(field.node.force).max(size(next.force)),
             lever: size(from_fn(|i| self.tip.position[i] - field.node.position[i])),
             turn: (next.angle[0] - field.node.angle[0]).abs(),

@@ -13,14 +13,15 @@
 //!
 //! Like every functional of the rod, the tip feels the product of this with what the cell misses of the curvature z by
 //! which a force on the tip bends the rod. z is taken to be as rough as κ in the cell, and as large as the moment of the
-//! force about a point as far away as the force in the rod lets bending reach. The tangent, of the turn h κ in the cell,
-//! is summed up by the Gauss rule with its remainder c_s. Over the length L,
+//! force about a point as far away as the force in the rod lets bending reach. The tangent t, which turns by h κ in the
+//! cell, is summed up by the Gauss rule with its remainder c_s. Over the length L,
 //!
 //! ```text
-//! e = h/L (C |δκ|² ℓ / |κ − κ̂| + c_s (h |κ|)^2s)          ℓ = min(√(EI/|n|), |r_tip − r|, L)
+//! e = Σ h/L C |δκ|² ℓ / |κ − κ̂| + |Σ h/L c_s (h |κ|)^2s t⊥|          ℓ = min(√(EI/|n|), |r_tip − r|, L)
 //! ```
 //!
-//! with the largest curvatures in the cell. It falls as h^2s over the rod, as the error does.
+//! with the largest curvatures in each cell and t⊥ the part of t across κ: all around a coil the latter sum vanishes, and
+//! each cell has its part of what is left. Both fall as h^2s over the rod, as the error does.
 //!
 //! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; where
 //! that would bring much energy, in a whip, they are what they were. Two cells are joined by their mean square best
@@ -39,8 +40,8 @@ use crate::plane::{Bending, Plane};
 use crate::pose::{Section, State};
 use crate::rod::Rod;
 use crate::so3;
-use crate::stepper::{Diverged, Reason, Report, Stepper};
-use crate::sweep::{Singular, larger};
+use crate::stepper::{Diverged, Reason, Report, Stepper, singular};
+use crate::sweep::larger;
 use nalgebra::Vector3;
 
 type Vec3 = Vector3<f64>;
@@ -61,7 +62,7 @@ const REFUSED: f64 = 2.5;
 /// 100 times and more in a whip.
 const BROUGHT: f64 = 4.0;
 /// Energy, relative, with which no cells are taken at leisure: that of folded ones, whose rates are beyond all bounds.
-const WILD: f64 = 0.1;
+const WILD: f64 = 0.02;
 /// The same where a step needs them: a rod that is wound up at once must have some that bring 5 times what it has.
 const WILD_AT_NEED: f64 = 10.0;
 /// How much more what is missed of the bending of a rod at rest counts than of one in motion: there one sees the cells change.
@@ -99,7 +100,7 @@ impl Share {
 /// What decides on the curvatures of new cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum By {
-    /// The energy that they bring, and that is this at most, relative; in a plane halved cells go on without any.
+    /// The energy that they bring, and that is this at most, relative.
     Energy(f64),
     /// Whether they are to be those that the moments ask for.
     Order(bool),
@@ -128,6 +129,8 @@ pub struct Refiner {
     /// Of the cells, now and lately; the turn of each.
     errors: Vec<f64>,
     lately: Vec<f64>,
+    /// Errors of the sums of tangents, each by itself.
+    sums: Vec<f64>,
     turns: Vec<f64>,
     /// What the [plane](Plane::looks) has looked at, of which they are.
     seen: Option<u64>,
@@ -142,7 +145,7 @@ pub struct Refiner {
 }
 
 archived!(Refiner { waited, lately } but {
-    tolerance, most_cells, coarsest, rule, errors, turns, seen, places, cells, origins, balanced, series, kept
+    tolerance, most_cells, coarsest, rule, errors, sums, turns, seen, places, cells, origins, balanced, series, kept
 });
 
 impl Refiner {
@@ -162,6 +165,7 @@ impl Refiner {
             series: Series::new(&coarsest.rule),
             rule: coarsest.rule.clone(),
             errors: room(),
+            sums: room(),
             lately: room(),
             kept: room(),
             turns: room(),
@@ -219,8 +223,8 @@ impl Refiner {
     /// The same of a rod in a plane.
     ///
     /// # Errors
-    /// [`Singular`] as of [`Self::adapt_plane`].
-    pub fn change_plane_to(&mut self, change: &Change, plane: &mut Plane, now: &Drive) -> Result<(), Singular> {
+    /// [`Diverged`] as of [`Self::adapt_plane`].
+    pub fn change_plane_to(&mut self, change: &Change, plane: &mut Plane, now: &Drive) -> Result<(), Diverged> {
         self.set_cells(&change.origins, plane.mesh());
         self.change_plane(plane, now, By::Order(change.balanced))
     }
@@ -252,6 +256,8 @@ impl Refiner {
             let at_node = bend(rod, node);
             let largest = |vectors: &[Vec3]| vectors.iter().map(Vec3::norm).fold(0.0, larger);
             let kappa = state.memory[j * stages..][..stages].iter().map(|memory| memory.kappa.norm());
+            let middle = j * stages + stages / 2;
+            let (axis, tangent) = (state.memory[middle].kappa.try_normalize(0.0).unwrap_or_default(), Vec3::z());
             Bending {
                 missed: (at_node - sum(&series.start, &at_points)).norm(),
                 coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
@@ -261,6 +267,7 @@ impl Refiner {
                 at_points: largest(&at_points),
                 at_nodes: largest(&[at_node, bend(rod, next)]),
                 curvature: kappa.fold(0.0, larger),
+                tangent: state.points[middle].rotation * (tangent - axis * axis.z),
                 force: larger(node.force.norm(), next.force.norm()),
                 lever: (state.tip().position - node.position).norm(),
                 turn: next.turn.norm(),
@@ -289,19 +296,36 @@ impl Refiner {
         let (length, stages) = (mesh.length(), mesh.rule.stages as i32);
         self.seen = None;
         self.errors.clear();
+        self.sums.clear();
         self.turns.clear();
+        let mut all = Vec3::zeros();
         for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
-            let Bending { missed, coefficients: [low, high], at_points, at_nodes, curvature, force, lever, turn } =
-                bending(&self.series, j);
+            let Bending {
+                missed,
+                coefficients: [low, high],
+                at_points,
+                at_nodes,
+                curvature,
+                tangent,
+                force,
+                lever,
+                turn,
+            } = bending(&self.series, j);
             // the next of a falling series: waves that the steps have not followed are not taken for more
             let next = if mesh.rule.stages == MAX_STAGES { high * high / low } else { f64::INFINITY };
             let missed = (missed * missed).min(next) / f64::from(2 * stages + 1);
             let arm = length.min(lever).min((stiffness / force).sqrt());
             // nothing is missed of what is not bent
             let bent = if missed == 0.0 { 0.0 } else { missed * arm / larger(at_points, at_nodes) };
-            let turned = self.series.remainder * (h * curvature).powi(2 * stages);
-            self.errors.push(h / length * (CALIBRATION * counts * bent + turned));
+            self.errors.push(h / length * CALIBRATION * counts * bent);
+            let missed = tangent * (h / length * self.series.remainder * (h * curvature).powi(2 * stages));
+            all += missed;
+            self.sums.push(missed.norm());
             self.turns.push(turn);
+        }
+        let left = all.norm() / larger(self.sums.iter().sum(), f64::MIN_POSITIVE);
+        for (error, sum) in self.errors.iter_mut().zip(&self.sums) {
+            *error += left * sum;
         }
         self.estimated()
     }
@@ -407,8 +431,8 @@ impl Refiner {
     /// The same of a rod in a plane; there is no looking back into the last step afterwards.
     ///
     /// # Errors
-    /// [`Singular`] as of [`Plane::start`]; the rod is as before.
-    pub fn adapt_plane(&mut self, plane: &mut Plane, drive: &Drive, joins: bool) -> Result<bool, Singular> {
+    /// [`Diverged`] as of [`Self::adapt`]; the rod is as before.
+    pub fn adapt_plane(&mut self, plane: &mut Plane, drive: &Drive, joins: bool) -> Result<bool, Diverged> {
         plane.look(1.0, drive);
         self.estimate_plane(plane);
         if !self.due(plane.mesh(), joins) {
@@ -460,8 +484,8 @@ impl Refiner {
     /// The same of a step in a plane that is accepted, and of which the end is seen: it is taken back.
     ///
     /// # Errors
-    /// [`Singular`] as of [`Plane::start`]; the step is taken back all the same.
-    pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Singular> {
+    /// [`Diverged`] as of [`Self::adapt`]; the step is taken back all the same.
+    pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Diverged> {
         self.estimate_plane(plane);
         if !self.refuses(plane.mesh()) {
             return Ok(false);
@@ -489,17 +513,28 @@ impl Refiner {
         larger(self.allowed(), (BROUGHT * self.estimated()).min(SHARE * ROUGH))
     }
 
-    fn change_plane(&mut self, plane: &mut Plane, drive: &Drive, by: By) -> Result<(), Singular> {
+    fn change_plane(&mut self, plane: &mut Plane, drive: &Drive, by: By) -> Result<(), Diverged> {
         plane.look(1.0, drive);
-        let before = plane.energy();
-        let most = self.most_balanced() * (plane.large() + before.kinetic + before.elastic);
-        let fits = |after: &Energy| match by {
-            By::Energy(_) => after.total() - before.total() <= most,
-            By::Order(balanced) => balanced,
+        let energy = plane.energy();
+        let scale = energy.scale(plane.large());
+        let tries = match by {
+            By::Energy(wild) => [(true, self.most_balanced()), (false, wild)],
+            By::Order(balanced) => [(balanced, f64::INFINITY); 2],
         };
-        self.balanced = plane.remesh(&mut self.cells, &self.origins, &self.series, drive, fits)?;
-        self.changed();
-        Ok(())
+        let Self { cells, origins, series, .. } = self;
+        let mut gain = 0.0;
+        for (balanced, most) in tries {
+            let fits = |after: &Energy| {
+                gain = (after.total() - energy.total()) / scale;
+                gain <= most
+            };
+            if plane.remesh(cells, (origins, series), drive, balanced, fits).map_err(singular)? {
+                self.balanced = balanced;
+                self.changed();
+                return Ok(());
+            }
+        }
+        Err(Diverged { iterations: 0, residual: gain, reason: Reason::Elsewhere })
     }
 
     /// The static equilibrium under `boundary`, on cells as fine as the tolerance asks for, and as Newton needs.
@@ -543,7 +578,7 @@ impl Refiner {
         let Stepper { mesh, rod, state, .. } = &*stepper;
         let gravity = &boundary.gravity;
         let energy = Energy::of(mesh, rod, state, gravity);
-        let scale = Energy::large(rod, mesh.length(), gravity) + energy.kinetic + energy.elastic;
+        let scale = energy.scale(Energy::large(rod, mesh.length(), gravity));
         let most = self.most_balanced();
         let Self { cells, origins, series, .. } = self;
         let (mesh, rod, before, state) = stepper.remesh(cells);
@@ -718,8 +753,8 @@ fn transfer(
                     // at a release moments are balanced that have not bent the rod yet
                     let bent = |kappa: &Vec3| (kappa - before.0[first].kappa_rest).norm();
                     let most = shape.kappa[..stages].iter().map(bent).fold(0.0, larger);
-                    let balanced = bend(rod, &old.nodes[first]);
-                    let missed = balanced - sum(&series.start, &bend_at_points(rod, old, stages, first));
+                    let asked = bend(rod, &old.nodes[first]);
+                    let missed = asked - sum(&series.start, &bend_at_points(rod, old, stages, first));
                     let beside = missed * (rule.beside(theta) * (most / missed.norm()).min(1.0));
                     (went_on.0 + beside, went_on.1)
                 };

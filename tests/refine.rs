@@ -163,6 +163,34 @@ fn the_estimate_is_of_the_size_of_the_error() {
     }
 }
 
+#[test]
+fn all_around_a_coil_the_errors_of_its_chords_vanish() {
+    // four turns, pulled by three times their weight
+    let (radius, rise) = (0.02, 0.01 / (2.0 * PI));
+    let arc = f64::hypot(radius, rise);
+    let (length, kappa) = (8.0 * PI * arc, Vec3::new(0.0, radius, -rise) / (arc * arc));
+    let rod = Rod::circular(1e-3, 2e11, 2e11 / 2.6, 7850.0);
+    let tangent = Vec3::new(0.0, radius, rise) / arc;
+    let base =
+        Support::at_rest(Vec3::zeros(), Matrix3::from_columns(&[-Vec3::x(), tangent.cross(&-Vec3::x()), tangent]));
+    let pulled = Boundary { tip_force: -Vec3::z(), ..Boundary::hanging_from(base, Vec3::z() * -9.81) };
+    let at_rest = |cells: usize, stages: usize| {
+        let mesh = Mesh::uniform(length, cells, stages, kappa);
+        let state = State::at_rest_shape(&mesh, &pulled.base);
+        let mut stepper = Stepper::new(mesh, rod.clone(), state);
+        stepper.equilibrium(&pulled).unwrap();
+        stepper
+    };
+    let exact = at_rest(48, 4).state.tip().position;
+    for (cells, stages) in [(11, 2), (16, 2), (11, 3)] {
+        let stepper = at_rest(cells, stages);
+        let error = (stepper.state.tip().position - exact).norm() / length;
+        let estimate = Refiner::new(&stepper.mesh, 1.0, cells).estimate_space(&stepper);
+        // each by itself, they are 20 to 60 times that
+        assert!((0.1 * error..10.0 * error).contains(&estimate), "{cells} × {stages}: {error:.1e}, {estimate:.1e}");
+    }
+}
+
 /// Tip position and velocity, force on the base, kinetic, elastic and potential energy.
 type Record = [Vec3; 4];
 

@@ -163,6 +163,9 @@ fn a_cell_that_folds_is_passed() {
         ("hair", &hair, 25, 1e-2, 0.1, 10),
         ("hair", &hair, 25, 1e-3, 1.0, 1),
         ("rubber", &rubber, 25, 1e-2, 0.1, 20),
+        // too long for steps as short as the whip asks for in all of it
+        ("hair", &hair, 100, 1e-2, 100.0, 1),
+        ("rubber", &rubber, 25, 1e-2, 100.0, 1),
     ] {
         release(name, &Parameters { tolerance, cells, stages: 1, ..parameters.clone() }, step_size, steps);
     }

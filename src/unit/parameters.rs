@@ -325,13 +325,25 @@ impl Parameters {
         }
         let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
         let coiled = turn / COARSEST_TURN;
-        // what the rest shape asks for is more than enough then
-        let few = self.stages == 0 && self.tip_mode == 0 && tolerance > ROUGH && coiled > likely;
-        let coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize, if few { FEW_STAGES } else { stages });
+        let mut coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize, stages);
+        // where what the rest shape asks for is more than enough, fewer points may do in some cells more
+        if self.stages == 0 && self.tip_mode == 0 && coiled > likely {
+            let cells = |coil: &Coil| coiled * (coil.reference / tolerance).powf(0.5 / coil.stages as f64).max(1.0);
+            let cost = |coil: &Coil| cells(coil) * coil.cost;
+            if let Some(coil) = COILS.iter().min_by(|one, other| cost(one).total_cmp(&cost(other))) {
+                coarsest = in_cells(cells(coil).ceil() as usize, coil.stages);
+            }
+        }
         let most = likely.max(turn).max(coarsest.cells.len() as f64);
         let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
-        // the motion to come is not seen at the start
-        let cells = if self.tip_mode == 1 { self.length / self.longest_cell(rod, boundary, tolerance) } else { likely };
+        let cells = if self.tip_mode == 1 {
+            // the motion to come is not seen at the start
+            self.length / self.longest_cell(rod, boundary, tolerance)
+        } else if self.start_in_equilibrium {
+            likely * (RESTING / tolerance).powf(0.4).min(1.0)
+        } else {
+            likely
+        };
         Ok((refiner.start(cells as usize), Some(refiner)))
     }
 
@@ -465,10 +477,23 @@ struct Cells {
     grows: f64,
 }
 
+/// A rule for a coil.
+struct Coil {
+    /// Gauss points in a cell.
+    stages: usize,
+    /// Time for a cell, over that of one with the most points.
+    cost: f64,
+    /// Tolerance at which cells of [`COARSEST_TURN`] are right.
+    reference: f64,
+}
+
 /// Measured on a rope of seven such lengths, five cells of four points are right to 3e-4.
 const ENOUGH: Cells = Cells { part: 0.7, reference: 1e-3, grows: 1.0 };
 /// Two thirds of the equal cells that just do for a rope and a hair, of 1e-2 to 1e-5: the motion concentrates what is bent.
 const LIKELY: Cells = Cells { part: 0.2, reference: 1e-2, grows: 1.8 };
+/// Tolerance beyond which a rod at rest begins with fewer than those. Below it the waves that new ones raise count, if it is
+/// hit: with half of them the errors of a struck cord are 4 to 6 times the tolerance.
+const RESTING: f64 = 1.8e-4;
 /// Fewest cells of a rod between two ends: it may turn by more than a whole turn on its way, and a cell by less than one.
 const CELLS_BETWEEN_ENDS: f64 = 4.0;
 /// More cells than any accuracy asks for; beyond it a slip of the host would be answered by the end of its memory.
@@ -483,10 +508,12 @@ const ROOM: f64 = 4.0;
 const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
-/// Tolerance beyond which cells of fewer points do where that turn sets their number, at half the cost.
-const ROUGH: f64 = 3e-4;
-/// Their points.
-const FEW_STAGES: usize = 3;
+/// As measured on a spring of four turns: such cells are right to twice these tolerances, or four times.
+const COILS: [Coil; 3] = [
+    Coil { stages: 2, cost: 0.34, reference: 2.2e-3 },
+    Coil { stages: 3, cost: 0.54, reference: 9e-5 },
+    Coil { stages: 4, cost: 1.0, reference: 1.7e-6 },
+];
 /// Turn of the rest shape in one cell, rad: its rotation vector ends at a full turn, and half of that is left to the
 /// motion.
 const MAX_CELL_TURN: f64 = 3.0;
