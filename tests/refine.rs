@@ -165,7 +165,7 @@ fn the_estimate_is_of_the_size_of_the_error() {
 
 #[test]
 fn all_around_a_coil_the_errors_of_its_chords_vanish() {
-    // four turns, pulled by three times their weight
+    // four turns, pulled by eight times their weight
     let (radius, rise) = (0.02, 0.01 / (2.0 * PI));
     let arc = f64::hypot(radius, rise);
     let (length, kappa) = (8.0 * PI * arc, Vec3::new(0.0, radius, -rise) / (arc * arc));
