@@ -508,19 +508,22 @@ impl Refiner {
         SHARE * self.tolerance
     }
 
-    /// Energy, relative, that new cells may bring with the curvatures that the moments ask for.
-    fn most_balanced(&self) -> f64 {
-        larger(self.allowed(), (BROUGHT * self.estimated()).min(SHARE * ROUGH))
+    /// Whether the curvatures of new cells are those that the moments ask for, and the energy, relative, that they may bring
+    /// then: in the order in which that is tried.
+    fn tries(&self, by: By) -> [(bool, f64); 2] {
+        match by {
+            By::Energy(wild) => {
+                let most = larger(self.allowed(), (BROUGHT * self.estimated()).min(SHARE * ROUGH));
+                [(true, most.min(wild)), (false, wild)]
+            }
+            By::Order(balanced) => [(balanced, f64::INFINITY); 2],
+        }
     }
 
     fn change_plane(&mut self, plane: &mut Plane, drive: &Drive, by: By) -> Result<(), Diverged> {
         plane.look(1.0, drive);
         let energy = plane.energy();
-        let scale = energy.scale(plane.large());
-        let tries = match by {
-            By::Energy(wild) => [(true, self.most_balanced()), (false, wild)],
-            By::Order(balanced) => [(balanced, f64::INFINITY); 2],
-        };
+        let (scale, tries) = (energy.scale(plane.large()), self.tries(by));
         let Self { cells, origins, series, .. } = self;
         let mut gain = 0.0;
         for (balanced, most) in tries {
@@ -579,27 +582,21 @@ impl Refiner {
         let gravity = &boundary.gravity;
         let energy = Energy::of(mesh, rod, state, gravity);
         let scale = energy.scale(Energy::large(rod, mesh.length(), gravity));
-        let most = self.most_balanced();
+        let tries = self.tries(by);
         let Self { cells, origins, series, .. } = self;
         let (mesh, rod, before, state) = stepper.remesh(cells);
         let mut gain = 0.0;
-        for balanced in [true, false] {
-            self.balanced = balanced;
-            transfer((cells, before), (origins, series), (mesh, state), rod, balanced);
+        let taken = tries.into_iter().find(|(balanced, most)| {
+            transfer((cells, before), (origins, series), (mesh, state), rod, *balanced);
             gain = (Energy::of(mesh, rod, state, gravity).total() - energy.total()) / scale;
-            let fits = match by {
-                By::Energy(_) => gain <= most,
-                By::Order(order) => balanced == order,
-            };
-            if fits {
-                break;
+            gain <= *most
+        });
+        let started = match taken {
+            Some((balanced, _)) => {
+                self.balanced = balanced;
+                stepper.accelerate(boundary)
             }
-        }
-        let started = match by {
-            By::Energy(wild) if gain.is_nan() || gain > wild => {
-                Err(Diverged { iterations: 0, residual: gain, reason: Reason::Elsewhere })
-            }
-            _ => stepper.accelerate(boundary),
+            None => Err(Diverged { iterations: 0, residual: gain, reason: Reason::Elsewhere }),
         };
         if started.is_err() {
             stepper.undo_remesh(cells);

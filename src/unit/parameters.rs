@@ -325,15 +325,16 @@ impl Parameters {
         }
         let likely = self.cells_enough(rod, boundary, tolerance, LIKELY);
         let coiled = turn / COARSEST_TURN;
-        let mut coarsest = in_cells((AT_REST * likely).max(coiled).ceil() as usize, stages);
         // where what the rest shape asks for is more than enough, fewer points may do in some cells more
-        if self.stages == 0 && self.tip_mode == 0 && coiled > likely {
-            let cells = |coil: &Coil| coiled * (coil.reference / tolerance).powf(0.5 / coil.stages as f64).max(1.0);
-            let cost = |coil: &Coil| cells(coil) * coil.cost;
-            if let Some(coil) = COILS.iter().min_by(|one, other| cost(one).total_cmp(&cost(other))) {
-                coarsest = in_cells(cells(coil).ceil() as usize, coil.stages);
-            }
-        }
+        let is_coil = self.stages == 0 && self.tip_mode == 0 && coiled > likely;
+        let cells = |coil: &Coil| coiled * (coil.reference / tolerance).powf(0.5 / coil.stages as f64).max(1.0);
+        let cost = |coil: &Coil| cells(coil) * coil.cost;
+        let coil = COILS.iter().filter(|_| is_coil).min_by(|one, other| cost(one).total_cmp(&cost(other)));
+        let (cells, stages) = match coil {
+            Some(coil) => (cells(coil), coil.stages),
+            None => ((AT_REST * likely).max(coiled), stages),
+        };
+        let coarsest = in_cells(cells.ceil() as usize, stages);
         let most = likely.max(turn).max(coarsest.cells.len() as f64);
         let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
         let cells = if self.tip_mode == 1 {
