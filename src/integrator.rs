@@ -50,6 +50,9 @@ const CHANGE: (f64, f64) = (0.2, 4.0);
 const SPACE_SHARE: Share = Share { part: 0.026, power: 0.17 };
 /// The same in a plane.
 const PLANE_SHARE: Share = Share { part: 0.09, power: 0.15 };
+/// Part of the estimated error that the iteration of a step of order 4 may leave: those of many point one way and add up.
+/// One of order 2 may leave as much as that.
+const ITERATED: f64 = 0.5;
 /// Estimated error of steps of order 2 in the time that gravity or stiffness take to move the whole rod, over the tolerance.
 const SIMPLE_SHARE: f64 = 1.9;
 /// Tolerance below which steps in a plane are of order 5.
@@ -806,7 +809,8 @@ impl Integrator {
         (time, dt): (f64, f64),
         (must, refuses): (bool, bool),
     ) -> Outcome {
-        let accuracy = self.pace_of(method, dt).allowed;
+        let allowed = self.pace_of(method, dt).allowed;
+        let accuracy = if method.order == 2 { allowed } else { ITERATED * allowed };
         let Attempt { iterations, error, work } = match self.compute(method, drive, (time, dt), accuracy) {
             Ok(attempt) => attempt,
             Err(diverged) => {

@@ -56,15 +56,21 @@ const SHARE: f64 = 0.17;
 /// Part of its share that a pair of cells must keep below once joined: the waves that a change raises count the more, the
 /// less may be amiss.
 const JOINED: Share = Share { part: 0.22, power: 0.25 };
-/// Times what the cells may use up at which the step that has brought them there is taken back.
-const REFUSED: f64 = 2.5;
+/// Times what the cells may use up at which the step that has brought them there is taken back, in space: what a blow does
+/// at once to too few cells goes on as a velocity.
+const REFUSED: f64 = 1.5;
+/// The same in a plane: with less, cells of a rod that whips change in vain; with 4, a cord that begins to whirl has too few.
+const REFUSED_IN_PLANE: f64 = 2.5;
 /// Energy that cells bring which leave as much less of an error, relative, over that: up to 3 times it where they are due,
 /// 100 times and more in a whip.
 const BROUGHT: f64 = 4.0;
-/// Energy, relative, with which no cells are taken at leisure: that of folded ones, whose rates are beyond all bounds.
+/// Energy, relative, with which no cells are taken: that of folded ones, whose rates are beyond all bounds.
 const WILD: f64 = 0.02;
 /// The same where a step needs them: a rod that is wound up at once must have some that bring 5 times what it has.
 const WILD_AT_NEED: f64 = 10.0;
+/// Times what the cells may use up from which a step needs others, whatever they bring: one that winds the rod up comes to
+/// 1e4 times, in a whip it is 3 times.
+const NEED: f64 = 100.0;
 /// How much more what is missed of the bending of a rod at rest counts than of one in motion: there one sees the cells change.
 const AT_REST: f64 = 10.0;
 /// Tolerance beyond which shares grow no more: a rod need not be followed, but no energy may come of it.
@@ -474,10 +480,11 @@ impl Refiner {
     /// [`Diverged`] as of [`Self::adapt`]; the attempt is lost.
     pub fn refuse(&mut self, stepper: &mut Stepper, boundary: &Boundary) -> Result<bool, Diverged> {
         self.estimate_state(stepper, stepper.attempted(), 1.0);
-        if !self.refuses(&stepper.mesh) {
+        if !self.refuses(&stepper.mesh, REFUSED) {
             return Ok(false);
         }
-        self.change(stepper, boundary, By::Energy(WILD_AT_NEED))?;
+        let wild = if self.estimated() > NEED * self.allowed() { WILD_AT_NEED } else { WILD };
+        self.change(stepper, boundary, By::Energy(wild))?;
         Ok(true)
     }
 
@@ -487,7 +494,7 @@ impl Refiner {
     /// [`Diverged`] as of [`Self::adapt`]; the step is taken back all the same.
     pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Diverged> {
         self.estimate_plane(plane);
-        if !self.refuses(plane.mesh()) {
+        if !self.refuses(plane.mesh(), REFUSED_IN_PLANE) {
             return Ok(false);
         }
         plane.take_back();
@@ -495,8 +502,9 @@ impl Refiner {
         Ok(true)
     }
 
-    fn refuses(&mut self, mesh: &Mesh) -> bool {
-        if self.estimated() <= REFUSED * self.allowed() && self.turns.iter().all(|turn| *turn < MOST_TURN[0]) {
+    /// Whether the step whose end is estimated is to be taken back, beyond so many `times` what the cells may use up.
+    fn refuses(&mut self, mesh: &Mesh, times: f64) -> bool {
+        if self.estimated() <= times * self.allowed() && self.turns.iter().all(|turn| *turn < MOST_TURN[0]) {
             return false;
         }
         self.remember(mesh.cells.len());

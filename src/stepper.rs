@@ -33,10 +33,8 @@ const TOLERANCE: f64 = 1e-8;
 /// The same in units of the rounding of n and m, for steps and cells so small that rounding exceeds [`TOLERANCE`].
 const ROUNDINGS: f64 = 256.0;
 
-/// Part of what a stage need not resolve that its iteration may leave: the errors of many steps point one way and add up.
-const PART_LEFT: f64 = 0.1;
-/// What no iteration of a stage need leave less than.
-const FINEST: f64 = 1e-13;
+/// Bounds of what the iteration of a stage may leave, rad: the roundings, and what Newton still gains from.
+const LEFT: (f64, f64) = (1e-13, 1e-3);
 /// Part of an increment of Newton's own that it leaves at most: what the Jacobian leaves out, or its square.
 const NEWTON_LEAVES: f64 = 1e-2;
 /// Iterations in which kept factors must be seen to lead there: beyond them new ones cost less.
@@ -557,7 +555,7 @@ impl Stepper {
     ) -> Result<usize, Diverged> {
         prepare(self);
         let (scales, rounding) = scales(&self.mesh, &self.rod, &self.old, boundary, time);
-        let target = (accuracy * PART_LEFT).clamp(FINEST, 1e-5);
+        let target = accuracy.clamp(LEFT.0, LEFT.1);
         let mut keep = *factors == Factors::Good;
         let mut borrowed = keep;
         let mut before = f64::INFINITY;

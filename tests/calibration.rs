@@ -24,16 +24,41 @@ fn reference(scene: Scene) -> (Vec<Vector3<f64>>, f64) {
 /// Cells, points in each, tolerance of the steps.
 type Setting = (i32, i32, f64);
 
-/// The cheapest settings, found by search, that meet the tolerances from 1e-2 down by tens.
+/// The cheapest settings, found by search, that meet the tolerances from 1e-2 down by tens, and not by luck: with a rod of
+/// another [stiffness](STIFFNESS) too.
 const CHEAPEST: [(Scene, &[Setting]); 7] = [
-    (Scene::Rope, &[(3, 4, 3e-2), (6, 4, 3e-1), (12, 4, 3e-2), (16, 4, 3e-5)]),
-    (Scene::Wire, &[(1, 3, 3e-3), (1, 3, 3e-4), (1, 4, 1e-2), (2, 3, 3e-4), (2, 4, 3e-5)]),
-    (Scene::Pulse, &[(4, 3, 1e-1), (8, 3, 1e-3), (12, 3, 1e-3), (12, 4, 3e-5), (16, 4, 3e-6)]),
-    (Scene::Spring, &[(12, 1, 3e-2), (12, 1, 1e-1), (12, 2, 1e-2), (12, 3, 3e-5)]),
-    (Scene::Hair, &[(4, 4, 3e-2), (8, 4, 3e-2), (12, 4, 1e-4), (24, 4, 3e-5)]),
-    (Scene::Spin, &[(2, 2, 1e-2), (2, 3, 1e-2), (4, 3, 3e-5), (4, 4, 1e-5), (6, 4, 1e-6)]),
-    (Scene::Umbilical, &[(1, 3, 3e-2), (1, 4, 3e-2), (3, 4, 3e-2), (8, 4, 1e-2), (16, 4, 1e-6)]),
+    (Scene::Rope, &[(3, 4, 3e-1), (8, 4, 3e-1), (12, 4, 3e-1), (16, 4, 3e-5)]),
+    (Scene::Wire, &[(1, 3, 3e-1), (1, 3, 3e-1), (1, 4, 3e-1), (2, 3, 3e-1), (3, 4, 3e-6)]),
+    (Scene::Pulse, &[(4, 3, 3e-1), (8, 3, 1e-3), (12, 3, 1e-4), (12, 4, 1e-5), (16, 4, 3e-6)]),
+    (Scene::Spring, &[(12, 1, 1e-1), (12, 1, 1e-1), (16, 2, 1e-4), (12, 3, 3e-5)]),
+    (Scene::Hair, &[(4, 4, 3e-1), (8, 4, 3e-1), (12, 4, 1e-4), (24, 4, 3e-5)]),
+    (Scene::Spin, &[(2, 2, 3e-1), (2, 3, 3e-4), (4, 3, 3e-5), (6, 3, 3e-6), (12, 3, 3e-7)]),
+    (Scene::Umbilical, &[(1, 3, 3e-1), (1, 4, 3e-1), (3, 4, 3e-1), (8, 4, 3e-1), (16, 4, 1e-6)]),
 ];
+
+/// Over that of the scene.
+const STIFFNESS: [f64; 3] = [1.0, 0.9, 1.1];
+
+/// The rod of a scene with so many times its stiffness, and its tips.
+fn stiffened(scene: Scene, times: f64) -> (Parameters, Vec<Vector3<f64>>) {
+    let parameters = scene.parameters();
+    let (youngs_modulus, shear_modulus) = (times * parameters.youngs_modulus, times * parameters.shear_modulus);
+    let parameters = Parameters { youngs_modulus, shear_modulus, ..parameters };
+    if times == 1.0 {
+        return (parameters, reference(scene).0);
+    }
+    // by 2e-7 to 7e-7 of the length, as the scenes themselves are with these cells and steps
+    let cells = if scene == Scene::Spring { 48 } else { 32 };
+    let fine = Parameters { cells, stages: 4, ..parameters.clone() };
+    let mut rod = fine.start(&scene.boundary(0.0), 1e-7).unwrap();
+    let interval = scene.duration() / 100.0;
+    let mut tips = vec![rod.ends().position];
+    for k in 0..100 {
+        rod.advance(&|since| scene.drive(f64::from(k) * interval + since), interval).unwrap();
+        tips.push(rod.ends().position);
+    }
+    (parameters, tips)
+}
 
 /// A run, and its error of the tip over the length, root mean square, and its work in time for an iteration of a cell of four
 /// points in space, or for a step of one in a plane.
@@ -84,21 +109,32 @@ fn the_tip_is_within_three_times_the_tolerance() {
 #[test]
 fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
     for (scene, settings) in CHEAPEST {
-        let (tips, _) = reference(scene);
+        // a softer hair whips within the time for which it can be predicted
+        let stiffness = if scene == Scene::Hair { &STIFFNESS[..1] } else { &STIFFNESS };
+        let rods: Vec<_> = stiffness.iter().map(|times| stiffened(scene, *times)).collect();
         for (i, (cells, stages, of_steps)) in settings.iter().enumerate() {
             let tolerance = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6][i];
-            let fixed = Parameters { cells: *cells, stages: *stages, ..scene.parameters() };
-            let cheapest = run(scene, &fixed, &tips, *of_steps);
-            assert!(cheapest.error < tolerance, "{}, {tolerance:e}: {:.1e}", scene.name(), cheapest.error);
-            // it is more where errors happen to cancel, as those of space and time do on the spring, and where too few cells
-            // happen to do for what comes, which is not known beforehand
+            let (mut fixed, mut chosen) = (0.0, 0.0);
+            for (times, (parameters, tips)) in stiffness.iter().zip(&rods) {
+                let name = format!("{}, {times} times as stiff, {tolerance:e}", scene.name());
+                let run_with = |parameters: &Parameters, tolerance: f64| run(scene, parameters, tips, tolerance);
+                let set = Parameters { cells: *cells, stages: *stages, ..parameters.clone() };
+                let Run { error, work, .. } = run_with(&set, *of_steps);
+                assert!(error < tolerance, "{name}: {error:.1e}");
+                fixed += work;
+                let Run { error, work, .. } = run_with(parameters, tolerance);
+                assert!(error < 3.0 * tolerance, "{name}: {error:.1e}");
+                chosen += work;
+            }
+            // it is more where fewer cells happen to do for what comes than one may count on, and where three points do and
+            // the unit must have four, lest it leaves a plane with too few
             let most = match (scene, i) {
-                (Scene::Spring, 2) => 3.6,
-                (Scene::Umbilical, 1) => 2.8,
-                (Scene::Wire, 4) | (Scene::Spin, 0 | 1) | (Scene::Pulse, 0 | 2) | (Scene::Rope, 1) => 2.5,
+                (Scene::Umbilical, 1) => 3.1,
+                (Scene::Pulse, 0) => 2.9,
+                (Scene::Spin, 0) => 2.2,
                 _ => 2.0,
             };
-            let times = run(scene, &scene.parameters(), &tips, tolerance).work / cheapest.work;
+            let times = chosen / fixed;
             assert!(times < most, "{}, {tolerance:e}: {times:.2} times the cheapest", scene.name());
         }
     }

@@ -175,11 +175,12 @@ fn a_cell_that_folds_is_passed() {
 fn cells_that_change_in_a_whip_bring_no_energy() {
     // undamped rods, let go at an angle with a body at the tip: length, w L³/EI, tolerance, the body over the rod, the angle.
     // Cells whose curvatures are always those that the moments ask for bring 6 times what the second one can fall, and folded
-    // ones that are halved a thousand times what the first can
+    // ones that are halved a thousand times what the first can; those of the last, once it has left its plane, a tenth
     for (length, softness, tolerance, body, angle, planar) in [
         (4.3852887463335515, 2962.6908219684524, 0.02460680158781759, 0.38758847519386475, 0.7932789718797385, true),
         (0.8424772817432211, 132.81656517787277, 0.0075834917008355904, 0.0, 1.4291157665137448, true),
         (2.414232121489447, 65.44345823085224, 0.009432173071942237, 0.5960018019099594, 0.3239591783591833, false),
+        (0.3197217121459786, 3734.7734581832574, 0.010723326522744433, 0.0, 0.5342576820326008, true),
     ] {
         let (radius, density, g) = (0.004 * length, 1200.0, 9.81);
         let weight = PI * radius * radius * density * g;
@@ -205,7 +206,7 @@ fn cells_that_change_in_a_whip_bring_no_energy() {
         for i in 0..80 {
             rod.advance(&|_| drive, 0.1 * (length / g).sqrt()).unwrap();
             let gained = rod.energy().residual(&begin) / ((1.0 + body) * weight * length * length);
-            // up to 0.03 in the last, whose cells are never as fine as it folds
+            // up to 0.03 in the third, whose cells are never as fine as it folds
             assert!(gained < 0.04, "{softness}, step {i}: {gained:e}");
         }
     }

@@ -484,7 +484,7 @@ struct Coil {
     stages: usize,
     /// Time for a cell, over that of one with the most points.
     cost: f64,
-    /// Tolerance at which cells of [`COARSEST_TURN`] are right.
+    /// Tolerance at which cells of [`COARSEST_TURN`] will do.
     reference: f64,
 }
 
@@ -509,9 +509,9 @@ const ROOM: f64 = 4.0;
 const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
-/// As measured on a spring of four turns: such cells are right to twice these tolerances, or four times.
+/// As measured on a spring of four turns: at these tolerances such cells use up their share.
 const COILS: [Coil; 3] = [
-    Coil { stages: 2, cost: 0.34, reference: 2.2e-3 },
+    Coil { stages: 2, cost: 0.34, reference: 1.6e-3 },
     Coil { stages: 3, cost: 0.54, reference: 9e-5 },
     Coil { stages: 4, cost: 1.0, reference: 1.7e-6 },
 ];
