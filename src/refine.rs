@@ -68,8 +68,8 @@ const BROUGHT: f64 = 4.0;
 const WILD: f64 = 0.02;
 /// The same where a step needs them: a rod that is wound up at once must have some that bring 5 times what it has.
 const WILD_AT_NEED: f64 = 10.0;
-/// Times what the cells may use up from which a step needs others, whatever they bring: one that winds the rod up comes to
-/// 1e4 times, in a whip it is 3 times.
+/// Times what the cells may use up from which a step needs others: one that winds the rod up comes to 1e4 times, in a whip it
+/// is 3 times.
 const NEED: f64 = 100.0;
 /// How much more what is missed of the bending of a rod at rest counts than of one in motion: there one sees the cells change.
 const AT_REST: f64 = 10.0;

@@ -6,18 +6,18 @@
 #[path = "../src/cli/chart/scenes.rs"]
 mod scenes;
 
-use cosserat_rod::integrator::Integrator;
+use cosserat_rod::integrator::{Effort, Integrator};
 use cosserat_rod::unit::{Inputs, Parameters, Unit};
 use nalgebra::{Vector3, Vector4};
 use scenes::Scene;
 use serde_json::Value;
 
-/// Tips at a hundred equal intervals and the start, and by which they may be wrong themselves over the length.
+/// Tips after a hundred equal intervals, and by which they may be wrong themselves over the length.
 fn reference(scene: Scene) -> (Vec<Vector3<f64>>, f64) {
     let path = format!("{}/benches/peers/reference/{}.json", env!("CARGO_MANIFEST_DIR"), scene.name());
     let content: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let vector = |v: &Value| Vector3::from_fn(|i, _| v[i].as_f64().unwrap());
-    let tips = content["tip"].as_array().unwrap().iter().map(vector).collect();
+    let tips = content["tip"].as_array().unwrap()[1..].iter().map(vector).collect();
     (tips, content["tip_uncertainty"].as_f64().unwrap())
 }
 
@@ -50,14 +50,20 @@ fn stiffened(scene: Scene, times: f64) -> (Parameters, Vec<Vector3<f64>>) {
     // by 2e-7 to 7e-7 of the length, as the scenes themselves are with these cells and steps
     let cells = if scene == Scene::Spring { 48 } else { 32 };
     let fine = Parameters { cells, stages: 4, ..parameters.clone() };
-    let mut rod = fine.start(&scene.boundary(0.0), 1e-7).unwrap();
+    let mut tips = Vec::new();
+    follow(scene, &fine, 1e-7, |rod| tips.push(rod.ends().position));
+    (parameters, tips)
+}
+
+/// The rod of a scene after it, seen after each of a hundred equal intervals.
+fn follow(scene: Scene, parameters: &Parameters, tolerance: f64, mut see: impl FnMut(&mut Integrator)) -> Integrator {
+    let mut rod = parameters.start(&scene.boundary(0.0), tolerance).unwrap();
     let interval = scene.duration() / 100.0;
-    let mut tips = vec![rod.ends().position];
     for k in 0..100 {
         rod.advance(&|since| scene.drive(f64::from(k) * interval + since), interval).unwrap();
-        tips.push(rod.ends().position);
+        see(&mut rod);
     }
-    (parameters, tips)
+    rod
 }
 
 /// A run, and its error of the tip over the length, root mean square, and its work in time for an iteration of a cell of four
@@ -69,14 +75,10 @@ struct Run {
 }
 
 fn run(scene: Scene, parameters: &Parameters, tips: &[Vector3<f64>], tolerance: f64) -> Run {
-    let mut rod = parameters.start(&scene.boundary(0.0), tolerance).unwrap();
-    let intervals = (tips.len() - 1) as f64;
-    let interval = scene.duration() / intervals;
-    let (mut sum, mut work, mut before) = (0.0, 0.0, *rod.effort());
-    for (k, tip) in tips[1..].iter().enumerate() {
-        let begin = k as f64 * interval;
-        rod.advance(&|since| scene.drive(begin + since), interval).unwrap();
-        sum += (rod.ends().position - tip).norm_squared();
+    let mut tips = tips.iter();
+    let (mut sum, mut work, mut before) = (0.0, 0.0, Effort::default());
+    let rod = follow(scene, parameters, tolerance, |rod| {
+        sum += (rod.ends().position - tips.next().unwrap()).norm_squared();
         let stages = rod.in_space().mesh.rule.stages;
         let (effort, cells) = (*rod.effort(), rod.cells() as f64);
         // as timed, cells of fewer points over those of four, and what a step takes besides
@@ -86,8 +88,8 @@ fn run(scene: Scene, parameters: &Parameters, tips: &[Vector3<f64>], tolerance: 
         };
         work += f64::from(count) * (cells * cell[stages - 1] + besides);
         before = effort;
-    }
-    Run { rod, error: (sum / intervals).sqrt() / scene.parameters().length, work }
+    });
+    Run { rod, error: (sum / 100.0).sqrt() / scene.parameters().length, work }
 }
 
 #[test]
