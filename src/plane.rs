@@ -421,10 +421,17 @@ pub(crate) struct Bending {
 }
 
 impl Bending {
-    /// What is missed, as far as it is not more than what there is: at a release moments are balanced that have not bent
-    /// the rod yet.
-    fn missed(&self) -> f64 {
-        self.missed.clamp(-self.at_points, self.at_points)
+    /// The square of what the coefficients of κ − κ̂ let expect of the next, as they fall, 1/m²: waves that the steps have
+    /// not followed are not taken for more. Those of fewer points tell nothing.
+    pub(crate) fn next(&self, stages: usize) -> f64 {
+        let [low, high] = self.coefficients;
+        if stages == MAX_STAGES { high * high / low } else { f64::INFINITY }
+    }
+
+    /// The most of what is missed that halves of the cell are to have, 1/m: no more than there is, since at a release moments
+    /// are balanced that have not bent the rod yet, and than one expects.
+    pub(crate) fn most(&self, stages: usize) -> f64 {
+        self.at_points.min(self.next(stages).sqrt())
     }
 }
 
@@ -690,8 +697,11 @@ impl Plane {
             match *origin {
                 Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
                 Origin::First(old) | Origin::Second(old) => {
-                    let missed = if balanced { self.bending(old, series).missed() } else { 0.0 };
-                    for k in 0..self.mesh.rule.stages {
+                    let stages = self.mesh.rule.stages;
+                    let bending = self.bending(old, series);
+                    let most = if balanced { bending.most(stages) } else { 0.0 };
+                    let missed = bending.missed.clamp(-most, most);
+                    for k in 0..stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);
                         let through = self.mesh.rule.through(theta);
                         let [g, g_t, _] = &self.fields[old].strain;

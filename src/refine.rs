@@ -23,11 +23,11 @@
 //! with the largest curvatures in each cell and t⊥ the part of t across κ: all around a coil the latter sum vanishes, and
 //! each cell has its part of what is left. Both fall as h^2s over the rod, as the error does.
 //!
-//! The curvatures of new cells are those that the moments ask for, κ + δκ, which raises no waves of the order of δκ; where
-//! that would bring much energy, in a whip, they are what they were. Two cells are joined by their mean square best
-//! approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change raises some
-//! waves, and is the better for being made in time: cells are halved before they have used up what the tolerance allows,
-//! and joined long after; a step that leaves too little is taken anew on finer ones.
+//! The curvatures of new cells are those that the moments ask for, κ + δκ, bounded alike, which raises no waves of the
+//! order of δκ; where that would bring much energy, in a whip, they are what they were. Two cells are joined by their mean
+//! square best approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change
+//! raises some waves, and is the better for being made in time: cells are halved before they have used up what the
+//! tolerance allows, and joined long after; a step that leaves too little is taken anew on finer ones.
 
 // J is a matrix
 #![allow(non_snake_case)]
@@ -257,27 +257,7 @@ impl Refiner {
         let Stepper { mesh, rod, .. } = stepper;
         let stages = mesh.rule.stages;
         self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), counts, |series, j| {
-            let (node, next) = (&state.nodes[j], &state.nodes[j + 1]);
-            let at_points = bend_at_points(rod, state, stages, j);
-            let at_node = bend(rod, node);
-            let largest = |vectors: &[Vec3]| vectors.iter().map(Vec3::norm).fold(0.0, larger);
-            let kappa = state.memory[j * stages..][..stages].iter().map(|memory| memory.kappa.norm());
-            let middle = j * stages + stages / 2;
-            let (axis, tangent) = (state.memory[middle].kappa.try_normalize(0.0).unwrap_or_default(), Vec3::z());
-            Bending {
-                missed: (at_node - sum(&series.start, &at_points)).norm(),
-                coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
-                    let more = series.coefficients(&at_points.map(|kappa| kappa[i]));
-                    [low + more[0], high + more[1]]
-                }),
-                at_points: largest(&at_points),
-                at_nodes: largest(&[at_node, bend(rod, next)]),
-                curvature: kappa.fold(0.0, larger),
-                tangent: state.points[middle].rotation * (tangent - axis * axis.z),
-                force: larger(node.force.norm(), next.force.norm()),
-                lever: (state.tip().position - node.position).norm(),
-                turn: next.turn.norm(),
-            }
+            bending(rod, state, stages, series, j)
         })
     }
 
@@ -306,20 +286,9 @@ impl Refiner {
         self.turns.clear();
         let mut all = Vec3::zeros();
         for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
-            let Bending {
-                missed,
-                coefficients: [low, high],
-                at_points,
-                at_nodes,
-                curvature,
-                tangent,
-                force,
-                lever,
-                turn,
-            } = bending(&self.series, j);
-            // the next of a falling series: waves that the steps have not followed are not taken for more
-            let next = if mesh.rule.stages == MAX_STAGES { high * high / low } else { f64::INFINITY };
-            let missed = (missed * missed).min(next) / f64::from(2 * stages + 1);
+            let bending = bending(&self.series, j);
+            let Bending { missed, at_points, at_nodes, curvature, tangent, force, lever, turn, .. } = bending;
+            let missed = (missed * missed).min(bending.next(mesh.rule.stages)) / f64::from(2 * stages + 1);
             let arm = length.min(lever).min((stiffness / force).sqrt());
             // nothing is missed of what is not bent
             let bent = if missed == 0.0 { 0.0 } else { missed * arm / larger(at_points, at_nodes) };
@@ -630,6 +599,37 @@ fn bend_at_points(rod: &Rod, state: &State, stages: usize, cell: usize) -> Lane 
     lane(stages, |k| bend(rod, &state.points[cell * stages + k]))
 }
 
+/// What of the curvature that the moments ask for a cell misses at its first node, as far as its halves are to have it.
+fn missed(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize) -> Vec3 {
+    let missed = bend(rod, &state.nodes[cell]) - sum(&series.start, &bend_at_points(rod, state, stages, cell));
+    missed * (bending(rod, state, stages, series, cell).most(stages) / missed.norm()).min(1.0)
+}
+
+/// How a cell is bent.
+fn bending(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize) -> Bending {
+    let (node, next) = (&state.nodes[cell], &state.nodes[cell + 1]);
+    let at_points = bend_at_points(rod, state, stages, cell);
+    let at_node = bend(rod, node);
+    let largest = |vectors: &[Vec3]| vectors.iter().map(Vec3::norm).fold(0.0, larger);
+    let kappa = state.memory[cell * stages..][..stages].iter().map(|memory| memory.kappa.norm());
+    let middle = cell * stages + stages / 2;
+    let (axis, tangent) = (state.memory[middle].kappa.try_normalize(0.0).unwrap_or_default(), Vec3::z());
+    Bending {
+        missed: (at_node - sum(&series.start, &at_points)).norm(),
+        coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
+            let more = series.coefficients(&at_points.map(|kappa| kappa[i]));
+            [low + more[0], high + more[1]]
+        }),
+        at_points: largest(&at_points),
+        at_nodes: largest(&[at_node, bend(rod, next)]),
+        curvature: kappa.fold(0.0, larger),
+        tangent: state.points[middle].rotation * (tangent - axis * axis.z),
+        force: larger(node.force.norm(), next.force.norm()),
+        lever: (state.tip().position - node.position).norm(),
+        turn: next.turn.norm(),
+    }
+}
+
 type Lane = [Vec3; MAX_STAGES];
 
 /// Σ weights_k x_k.
@@ -743,6 +743,10 @@ fn transfer(
         let shape = match *origin {
             Origin::Same(_) => shape,
             _ => {
+                let missed = match balanced && next.is_none() {
+                    true => missed(rod, old, stages, series, first),
+                    false => Vec3::zeros(),
+                };
                 let at = |k: usize| {
                     if let Some(next) = &next {
                         let [here, there] = series.joined.map(|weights| weights[k]);
@@ -751,17 +755,7 @@ fn transfer(
                     }
                     let (_, theta) = origin.at(rule.c[k]);
                     let through = rule.through(theta);
-                    let went_on = (sum(&through, &shape.kappa), sum(&through, &shape.kappa_t));
-                    if !balanced {
-                        return went_on;
-                    }
-                    // at a release moments are balanced that have not bent the rod yet
-                    let bent = |kappa: &Vec3| (kappa - before.0[first].kappa_rest).norm();
-                    let most = shape.kappa[..stages].iter().map(bent).fold(0.0, larger);
-                    let asked = bend(rod, &old.nodes[first]);
-                    let missed = asked - sum(&series.start, &bend_at_points(rod, old, stages, first));
-                    let beside = missed * (rule.beside(theta) * (most / missed.norm()).min(1.0));
-                    (went_on.0 + beside, went_on.1)
+                    (sum(&through, &shape.kappa) + missed * rule.beside(theta), sum(&through, &shape.kappa_t))
                 };
                 Shape::bent(rule, mesh.cells[j].length, lane(stages, |k| at(k).0), lane(stages, |k| at(k).1))
             }

@@ -131,7 +131,8 @@ fn a_step_that_fails_leaves_a_plane_rod_as_it_was() {
 #[test]
 fn a_cord_that_whirls_leaves_its_plane() {
     // shaken at 5 Hz with twice its weight it begins to whirl, as the rod in space does with a lateral push of 1e-9 N: that
-    // grows a hundred million times in two seconds. Damping keeps it in its plane
+    // grows a hundred million times in two seconds. Damping keeps it in its plane. A tenth stiffer it is on the edge: it
+    // leaves after 6 s or 13 s, as its tolerance makes it
     let down = Vector4::new(0.0, 1.0, 0.0, 0.0);
     let motion = |t: f64| {
         let (w, x) = (10.0 * PI, (t / 2.0).min(1.0));
@@ -139,11 +140,14 @@ fn a_cord_that_whirls_leaves_its_plane() {
         (part * (w * t).sin(), part * w * (w * t).cos())
     };
     for (damping, stays) in [(0.0, false), (0.01, true)] {
+        let stiffer = Parameters::default();
         let parameters = Parameters {
+            youngs_modulus: 0.9 * stiffer.youngs_modulus,
+            shear_modulus: 0.9 * stiffer.shear_modulus,
             damping_bending: damping,
             damping_twist: damping,
             start_in_equilibrium: true,
-            ..Parameters::default()
+            ..stiffer
         };
         let at = |t: f64| {
             let (x, v) = motion(t);
