@@ -23,23 +23,48 @@ pub const SAMPLES: usize = 100;
 /// How finely a rod is resolved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
-    /// Equal cells, and so many equal steps in all.
-    Grid { cells: usize, stages: usize, steps: usize },
+    /// Equal cells.
+    Grid { cells: usize, stages: usize, steps: Steps },
     /// Whatever the unit chooses for it.
     Tolerance(f64),
+}
+
+/// How finely it is in time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Steps {
+    /// So many in all.
+    Equal(usize),
+    /// As long as their error allows.
+    To(f64),
+}
+
+impl Steps {
+    /// The more, the finer; in proportion to their number as far as that is known.
+    pub fn fineness(self) -> f64 {
+        match self {
+            Self::Equal(count) => count as f64,
+            // order 4
+            Self::To(tolerance) => tolerance.powf(-0.25),
+        }
+    }
 }
 
 impl Resolution {
     /// Whether its steps are longer than those of `count` to the end.
     pub fn is_longer_than(&self, count: usize) -> bool {
-        matches!(self, Self::Grid { steps, .. } if *steps < count)
+        matches!(self, Self::Grid { steps: Steps::Equal(steps), .. } if *steps < count)
     }
 }
 
 impl fmt::Display for Resolution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Grid { cells, stages, steps } => write!(f, "cells={cells} stages={stages}, {steps} steps"),
+            Self::Grid { cells, stages, steps: Steps::Equal(steps) } => {
+                write!(f, "cells={cells} stages={stages}, {steps} steps")
+            }
+            Self::Grid { cells, stages, steps: Steps::To(tolerance) } => {
+                write!(f, "cells={cells} stages={stages} tolerance={tolerance:e}")
+            }
             Self::Tolerance(tolerance) => write!(f, "tolerance={tolerance:e}"),
         }
     }
@@ -91,7 +116,12 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     let Parameters { length, rest_curvature, .. } = scene.parameters();
     let cells = cell_counts(length * rest_curvature.norm());
     let to_samples = grids(&cells, &STAGES, refinements(SAMPLES));
-    let dense = grids(&cells, &STAGES, LONG_STEPS.into_iter().chain(refinements(SAMPLES)));
+    let dense = grids(&cells, &STAGES, LONG_STEPS.map(Steps::Equal).into_iter().chain(refinements(SAMPLES)));
+    let on_cells = |code, planar| Method {
+        code,
+        resolutions: grids(&cells, &STAGES, STEP_TOLERANCES.map(Steps::To).into_iter()),
+        solve: Box::new(move |resolution| of_unit_alone(scene, resolution, planar)),
+    };
     let planar = |code, method| Method {
         code,
         resolutions: dense.clone(),
@@ -108,6 +138,7 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
             resolutions: dense.clone(),
             solve: Box::new(move |resolution| of_grid(scene, resolution, fourth_order)),
         },
+        on_cells("cosserat-rod on given cells", false),
     ];
     let start = scene.drive(0.0);
     let mesh = Mesh::uniform(length, 1, 1, rest_curvature);
@@ -116,11 +147,12 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     {
         methods.push(planar("cosserat-rod plane, order 4", &RODAS4));
         methods.push(planar("cosserat-rod plane, order 5", &RODAS5P));
+        methods.push(on_cells("cosserat-rod plane, on given cells", true));
     }
     methods.push(Method {
         code: "cosserat-rod to a tolerance",
         resolutions: tolerances(&TOLERANCES),
-        solve: Box::new(move |resolution| of_tolerance(scene, resolution)),
+        solve: Box::new(move |resolution| of_unit_alone(scene, resolution, true)),
     });
     methods
 }
@@ -131,20 +163,40 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
     let fixed = |value: i32, otherwise: Vec<usize>| if value > 0 { vec![value as usize] } else { otherwise };
     let cells = fixed(given.cells, cell_counts(given.length * given.rest_curvature.norm()));
     let samples = experiment.steps().max(1);
+    let stages = fixed(given.stages, STAGES.to_vec());
     let steps = refinements(samples).take(if given.step > 0.0 { 1 } else { usize::MAX });
-    let grids = grids(&cells, &fixed(given.stages, STAGES.to_vec()), steps);
-    let tolerances = if given.tolerance > 0.0 { tolerances(&[given.tolerance]) } else { tolerances(&TOLERANCES) };
-    let solve = move |resolution| {
-        let parameters = match resolution {
-            Resolution::Grid { cells, stages, steps } => {
-                let step = if given.step > 0.0 { given.step } else { experiment.duration() / steps as f64 };
-                Parameters { cells: cells as i32, stages: stages as i32, step, ..given.clone() }
-            }
-            Resolution::Tolerance(tolerance) => Parameters { tolerance, ..given.clone() },
-        };
-        simulate(experiment, &parameters, resolution)
+    let to_tolerances = if given.tolerance > 0.0 { vec![given.tolerance] } else { STEP_TOLERANCES.to_vec() };
+    let on_cells = match given.step > 0.0 {
+        true => Vec::new(),
+        false => grids(&cells, &stages, to_tolerances.into_iter().map(Steps::To)),
     };
-    vec![Method { code: "cosserat-rod", resolutions: [tolerances, grids].concat(), solve: Box::new(solve) }]
+    let tolerances = if given.tolerance > 0.0 { tolerances(&[given.tolerance]) } else { tolerances(&TOLERANCES) };
+    let method = |code, resolutions| Method {
+        code,
+        resolutions,
+        solve: Box::new(move |resolution| {
+            simulate(experiment, &set(given, resolution, experiment.duration()), resolution)
+        }),
+    };
+    vec![
+        method("cosserat-rod", [tolerances, grids(&cells, &stages, steps)].concat()),
+        method("cosserat-rod on given cells", on_cells),
+    ]
+}
+
+/// The parameters of a resolution; equal steps are as given, or as many to the end of `duration`, s.
+fn set(given: &Parameters, resolution: Resolution, duration: f64) -> Parameters {
+    match resolution {
+        Resolution::Grid { cells, stages, steps } => {
+            let (step, tolerance) = match steps {
+                Steps::Equal(steps) if given.step == 0.0 => (duration / steps as f64, given.tolerance),
+                Steps::Equal(_) => (given.step, given.tolerance),
+                Steps::To(tolerance) => (0.0, tolerance),
+            };
+            Parameters { cells: cells as i32, stages: stages as i32, step, tolerance, ..given.clone() }
+        }
+        Resolution::Tolerance(tolerance) => Parameters { tolerance, ..given.clone() },
+    }
 }
 
 /// Displacement over the length that an iteration of a stage need not resolve.
@@ -152,7 +204,9 @@ const STAGE_ACCURACY: f64 = 1e-7;
 /// Steps over a built-in scene that are longer than its samples lie apart, which are then seen within the steps.
 const LONG_STEPS: [usize; 5] = [5, 10, 20, 25, 50];
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
-const STAGES: [usize; 3] = [1, 2, 4];
+/// Of steps on given cells: the first is as good as none.
+const STEP_TOLERANCES: [f64; 11] = [3e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7];
+const STAGES: [usize; 4] = [1, 2, 3, 4];
 /// Most cells, and twice as many as a wound rod needs at least.
 const CELLS: usize = 32;
 /// Turn of the rest shape in a cell, rad, up to which the unit takes a mesh.
@@ -176,11 +230,11 @@ fn cell_counts(turn: f64) -> Vec<usize> {
 }
 
 /// Steps that end on the samples.
-fn refinements(samples: usize) -> impl Iterator<Item = usize> + Clone {
-    (0..=HALVINGS).map(move |halvings| samples << halvings)
+fn refinements(samples: usize) -> impl Iterator<Item = Steps> + Clone {
+    (0..=HALVINGS).map(move |halvings| Steps::Equal(samples << halvings))
 }
 
-fn grids(cells: &[usize], stages: &[usize], all_steps: impl Iterator<Item = usize> + Clone) -> Vec<Resolution> {
+fn grids(cells: &[usize], stages: &[usize], all_steps: impl Iterator<Item = Steps> + Clone) -> Vec<Resolution> {
     let mut grids = Vec::new();
     for &cells in cells {
         for &stages in stages {
@@ -237,8 +291,8 @@ fn of_steps<R>(
 
 /// A rod of a scene in space, on a grid, at the start; its sample there, and what the grid is called.
 fn on_grid(scene: Scene, resolution: Resolution) -> Result<(Stepper, usize, String), Box<dyn Error>> {
-    let Resolution::Grid { cells, stages, steps } = resolution else {
-        return Err(format!("{resolution} is not a grid").into());
+    let Resolution::Grid { cells, stages, steps: Steps::Equal(steps) } = resolution else {
+        return Err(format!("{resolution} is not a grid of equal steps").into());
     };
     let start = scene.boundary(0.0);
     let Parameters { length, rest_curvature, .. } = scene.parameters();
@@ -304,13 +358,12 @@ fn fourth_order(stepper: &mut Stepper, scene: Scene, time: f64, step: f64) -> Re
     Ok(())
 }
 
-/// As the unit moves it, with the samples as communication points.
-fn of_tolerance(scene: Scene, resolution: Resolution) -> Result<Run, Box<dyn Error>> {
-    let Resolution::Tolerance(tolerance) = resolution else {
-        return Err(format!("{resolution} is not a tolerance").into());
-    };
-    let mut rod = scene.parameters().start(&scene.boundary(0.0), tolerance)?;
-    let mut run = Run { setting: resolution.to_string(), ..Run::default() };
+/// As the unit moves it, with the samples as communication points; in a plane if it may.
+fn of_unit_alone(scene: Scene, resolution: Resolution, planar: bool) -> Result<Run, Box<dyn Error>> {
+    let given = Parameters { planar, ..scene.parameters() };
+    let parameters = set(&given, resolution, scene.duration());
+    let mut rod = parameters.start(&scene.boundary(0.0), parameters.tolerance)?;
+    let mut run = Run::default();
     let ends = rod.ends();
     run.sample(&ends.position, &ends.force);
     let interval = scene.duration() / SAMPLES as f64;
@@ -325,8 +378,17 @@ fn of_tolerance(scene: Scene, resolution: Resolution) -> Result<Run, Box<dyn Err
     }
     run.cpu = clock.elapsed().as_secs_f64();
     run.planar = rod.effort().planar;
-    run.setting = format!("{resolution}: cells<={cells}");
+    run.setting = setting(resolution, &parameters, cells);
     Ok(run)
+}
+
+/// A resolution in the words of `--set`; one that was left the cells took `most`.
+fn setting(resolution: Resolution, parameters: &Parameters, most: usize) -> String {
+    match resolution {
+        Resolution::Grid { cells, stages, steps: Steps::Equal(_) } => grid(cells, stages, parameters.step),
+        Resolution::Grid { .. } => resolution.to_string(),
+        Resolution::Tolerance(_) => format!("{resolution}: cells<={most}"),
+    }
 }
 
 /// The unit, sampled at its communication points.
@@ -341,9 +403,6 @@ fn simulate(experiment: &Experiment, parameters: &Parameters, resolution: Resolu
         run.cpu = clock.elapsed().as_secs_f64();
         Ok(())
     })?;
-    run.setting = match resolution {
-        Resolution::Grid { cells, stages, .. } => grid(cells, stages, parameters.step),
-        Resolution::Tolerance(_) => format!("{resolution}: cells<={cells}"),
-    };
+    run.setting = setting(resolution, parameters, cells as usize);
     Ok(run)
 }

@@ -1,7 +1,7 @@
 //! Which resolutions to run: from cheap to dear, as long as they gain and the budget lasts.
 
 use super::front::{Measure, Point};
-use super::method::{Method, Resolution, Run};
+use super::method::{Method, Resolution, Run, Steps};
 use nalgebra::Vector3;
 use std::error::Error;
 use std::fs;
@@ -131,7 +131,7 @@ struct Ledger<'a, 'b> {
 /// Proportional to the time of a grid.
 fn work(resolution: Resolution) -> f64 {
     match resolution {
-        Resolution::Grid { cells, stages, steps } => (steps * (cells + 1)) as f64 * (stages as f64).powf(1.5),
+        Resolution::Grid { cells, stages, steps } => steps.fineness() * (cells + 1) as f64 * (stages as f64).powf(1.5),
         Resolution::Tolerance(_) => f64::INFINITY,
     }
 }
@@ -273,7 +273,7 @@ impl Ledger<'_, '_> {
 }
 
 /// The cells and the steps of the grids, ascending.
-fn axes(resolutions: &[Resolution]) -> (Vec<usize>, Vec<usize>) {
+fn axes(resolutions: &[Resolution]) -> (Vec<usize>, Vec<Steps>) {
     let (mut all_cells, mut all_steps) = (Vec::new(), Vec::new());
     for resolution in resolutions {
         if let Resolution::Grid { cells, steps, .. } = resolution {
@@ -281,11 +281,16 @@ fn axes(resolutions: &[Resolution]) -> (Vec<usize>, Vec<usize>) {
             all_steps.push(*steps);
         }
     }
-    for axis in [&mut all_cells, &mut all_steps] {
-        axis.sort_unstable();
-        axis.dedup();
-    }
+    all_cells.sort_unstable();
+    all_cells.dedup();
+    all_steps.sort_by(|a, b| a.fineness().total_cmp(&b.fineness()));
+    all_steps.dedup();
     (all_cells, all_steps)
+}
+
+/// What comes next on an axis.
+fn after<T: Copy + PartialEq>(axis: &[T], value: T) -> Option<T> {
+    axis.iter().copied().skip_while(|&other| other != value).nth(1)
 }
 
 /// Runs what is worth it; `budget` is CPU time, s.
@@ -356,7 +361,6 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
 /// is not far above the front.
 fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], reference: &Reference, most: f64) {
     let (cells_axis, steps_axis) = axes(resolutions);
-    let next = |axis: &[usize], value: usize| axis.iter().copied().find(|&other| other > value);
     let coarsest = |resolution: &Resolution| match resolution {
         Resolution::Grid { cells, steps, .. } => cells_axis.first() == Some(cells) && steps_axis.first() == Some(steps),
         Resolution::Tolerance(_) => false,
@@ -393,8 +397,8 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
             continue;
         }
         let finer = [
-            next(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, steps }),
-            next(&steps_axis, steps).map(|steps| Resolution::Grid { cells, stages, steps }),
+            after(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, steps }),
+            after(&steps_axis, steps).map(|steps| Resolution::Grid { cells, stages, steps }),
         ];
         for finer in finer.into_iter().flatten() {
             if !seen.contains(&finer) {
