@@ -54,7 +54,7 @@ const PLANE_SHARE: Share = Share { part: 0.09, power: 0.15 };
 /// One of order 2 may leave as much as that.
 const ITERATED: f64 = 0.5;
 /// Estimated error of steps of order 2 in the time that gravity or stiffness take to move the whole rod, over the tolerance.
-const SIMPLE_SHARE: f64 = 1.9;
+const SIMPLE_SHARE: Share = Share { part: 1.9, power: 0.15 };
 /// Tolerance below which steps in a plane are of order 5.
 const FINE: f64 = 5e-5;
 /// How much longer steps of order 2 may be with every interval that one of order 4 has passed.
@@ -319,6 +319,8 @@ pub struct Integrator {
     rest: f64,
     /// The tolerance over the time in which gravity or stiffness move the whole rod, 1/s.
     drift: f64,
+    /// Error that steps of order 2 may have, over their length, 1/s.
+    simple_drift: f64,
     energy: Energy,
     effort: Effort,
     before: Before,
@@ -395,6 +397,7 @@ impl Integrator {
             large,
             rest: AT_REST * tolerance * tolerance,
             drift: tolerance / time,
+            simple_drift: SIMPLE_SHARE.of(tolerance) * tolerance / time,
             energy,
             effort,
             state_before,
@@ -856,7 +859,7 @@ impl Integrator {
     fn pace_of(&mut self, method: &RungeKutta, dt: f64) -> &mut Pace {
         match method.order {
             2 => {
-                self.simple.allowed = SIMPLE_SHARE * self.drift * dt;
+                self.simple.allowed = self.simple_drift * dt;
                 &mut self.simple
             }
             _ => &mut self.pace,

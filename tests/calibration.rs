@@ -137,7 +137,7 @@ fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
             // the unit must have four, lest it leaves a plane with too few
             let most = match (scene, i) {
                 (Scene::Umbilical, 1) => 3.1,
-                (Scene::Pulse, 0) => 2.9,
+                (Scene::Pulse, 0) => 2.6,
                 (Scene::Spin, 0) => 2.2,
                 _ => 2.0,
             };
