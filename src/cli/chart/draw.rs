@@ -382,8 +382,8 @@ pub fn overview(charts: &[Chart], others: &[Point]) -> Result<Page, Box<dyn Erro
     })
 }
 
-/// What the unit makes of a tolerance: the error over it, and its CPU time over that of the cheapest grid which is as
-/// accurate as asked.
+/// What the unit makes of a tolerance: the error over it, and its CPU time over that of the cheapest cells that it may be
+/// given and that are as accurate as asked.
 pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
     const SIZE: f64 = 12.0;
     let (width, top, height) = (1000.0, 84.0, 320.0);
@@ -399,7 +399,7 @@ pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
         text(page, "What the unit makes of a tolerance", (24.0, 22.0), 19.0, INK, HPos::Left)?;
         let panels = [
             ("error of the tip over the tolerance", error, (-4, 1), 3.0),
-            ("CPU time over that of the cheapest equal cells and steps", cost, (-1, 2), 2.0),
+            ("CPU time over that of the cheapest given cells", cost, (-1, 2), 2.0),
         ];
         for (number, (title, value, range, bound)) in panels.into_iter().enumerate() {
             let axes = Axes { time: (-6, -2), error: range };
