@@ -698,9 +698,11 @@ impl Plane {
                 Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
                 Origin::First(old) | Origin::Second(old) => {
                     let stages = self.mesh.rule.stages;
-                    let bending = self.bending(old, series);
-                    let most = if balanced { bending.most(stages) } else { 0.0 };
-                    let missed = bending.missed.clamp(-most, most);
+                    let bounded = |bending: Bending| {
+                        let most = bending.most(stages);
+                        bending.missed.clamp(-most, most)
+                    };
+                    let missed = if balanced { bounded(self.bending(old, series)) } else { 0.0 };
                     for k in 0..stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);
                         let through = self.mesh.rule.through(theta);

@@ -257,7 +257,7 @@ impl Refiner {
         let Stepper { mesh, rod, .. } = stepper;
         let stages = mesh.rule.stages;
         self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), counts, |series, j| {
-            bending(rod, state, stages, series, j)
+            bending(rod, state, stages, series, j).0
         })
     }
 
@@ -594,28 +594,18 @@ fn bend(rod: &Rod, section: &Section) -> Vec3 {
     section.rotation.tr_mul(&section.moment).component_div(&rod.stiffness)
 }
 
-/// The same at the points of a cell.
-fn bend_at_points(rod: &Rod, state: &State, stages: usize, cell: usize) -> Lane {
-    lane(stages, |k| bend(rod, &state.points[cell * stages + k]))
-}
-
-/// What of the curvature that the moments ask for a cell misses at its first node, as far as its halves are to have it.
-fn missed(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize) -> Vec3 {
-    let missed = bend(rod, &state.nodes[cell]) - sum(&series.start, &bend_at_points(rod, state, stages, cell));
-    missed * (bending(rod, state, stages, series, cell).most(stages) / missed.norm()).min(1.0)
-}
-
-/// How a cell is bent.
-fn bending(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize) -> Bending {
+/// How a cell is bent, and what its curvature misses at the first node as a vector.
+fn bending(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize) -> (Bending, Vec3) {
     let (node, next) = (&state.nodes[cell], &state.nodes[cell + 1]);
-    let at_points = bend_at_points(rod, state, stages, cell);
+    let at_points = lane(stages, |k| bend(rod, &state.points[cell * stages + k]));
     let at_node = bend(rod, node);
     let largest = |vectors: &[Vec3]| vectors.iter().map(Vec3::norm).fold(0.0, larger);
     let kappa = state.memory[cell * stages..][..stages].iter().map(|memory| memory.kappa.norm());
     let middle = cell * stages + stages / 2;
     let (axis, tangent) = (state.memory[middle].kappa.try_normalize(0.0).unwrap_or_default(), Vec3::z());
-    Bending {
-        missed: (at_node - sum(&series.start, &at_points)).norm(),
+    let missed = at_node - sum(&series.start, &at_points);
+    let bending = Bending {
+        missed: missed.norm(),
         coefficients: (0..3).fold([0.0; 2], |[low, high], i| {
             let more = series.coefficients(&at_points.map(|kappa| kappa[i]));
             [low + more[0], high + more[1]]
@@ -627,7 +617,8 @@ fn bending(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize
         force: larger(node.force.norm(), next.force.norm()),
         lever: (state.tip().position - node.position).norm(),
         turn: next.turn.norm(),
-    }
+    };
+    (bending, missed)
 }
 
 type Lane = [Vec3; MAX_STAGES];
@@ -744,7 +735,10 @@ fn transfer(
             Origin::Same(_) => shape,
             _ => {
                 let missed = match balanced && next.is_none() {
-                    true => missed(rod, old, stages, series, first),
+                    true => {
+                        let (bending, missed) = bending(rod, old, stages, series, first);
+                        missed * (bending.most(stages) / bending.missed).min(1.0)
+                    }
                     false => Vec3::zeros(),
                 };
                 let at = |k: usize| {

@@ -40,7 +40,7 @@ const CHEAPEST: [(Scene, &[Setting]); 7] = [
 const STIFFNESS: [f64; 3] = [1.0, 0.9, 1.1];
 
 /// The rod of a scene with so many times its stiffness.
-fn stiffness(scene: Scene, times: f64) -> Parameters {
+fn with_stiffness(scene: Scene, times: f64) -> Parameters {
     let parameters = scene.parameters();
     let (youngs_modulus, shear_modulus) = (times * parameters.youngs_modulus, times * parameters.shear_modulus);
     Parameters { youngs_modulus, shear_modulus, ..parameters }
@@ -48,7 +48,7 @@ fn stiffness(scene: Scene, times: f64) -> Parameters {
 
 /// The same, and its tips.
 fn stiffened(scene: Scene, times: f64) -> (Parameters, Vec<Vector3<f64>>) {
-    let parameters = stiffness(scene, times);
+    let parameters = with_stiffness(scene, times);
     if times == 1.0 {
         return (parameters, reference(scene).0);
     }
@@ -214,7 +214,7 @@ fn a_hair_is_not_lost_however_loose_the_tolerance() {
 fn new_cells_ask_for_no_more_of_them() {
     // those that had more of the moments than may be believed raised waves that asked for more, to 40 to 64 of them
     for (times, tolerance) in [(0.9, 1e-2), (0.9, 1.2e-3), (1.1, 1.8034e-3)] {
-        let parameters = stiffness(Scene::Hair, times);
+        let parameters = with_stiffness(Scene::Hair, times);
         let mut most = 0;
         let rod = follow(Scene::Hair, &parameters, tolerance, |rod| most = rod.cells().max(most));
         assert!(most <= 20, "{times} times as stiff, {tolerance:e}: {most} cells");
