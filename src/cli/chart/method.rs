@@ -165,12 +165,7 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
     let samples = experiment.steps().max(1);
     let stages = fixed(given.stages, STAGES.to_vec());
     let steps = refinements(samples).take(if given.step > 0.0 { 1 } else { usize::MAX });
-    let to_tolerances = if given.tolerance > 0.0 { vec![given.tolerance] } else { STEP_TOLERANCES.to_vec() };
-    let on_cells = match given.step > 0.0 {
-        true => Vec::new(),
-        false => grids(&cells, &stages, to_tolerances.into_iter().map(Steps::To)),
-    };
-    let tolerances = if given.tolerance > 0.0 { tolerances(&[given.tolerance]) } else { tolerances(&TOLERANCES) };
+    let asked = |otherwise: &[f64]| if given.tolerance > 0.0 { vec![given.tolerance] } else { otherwise.to_vec() };
     let method = |code, resolutions| Method {
         code,
         resolutions,
@@ -178,10 +173,14 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
             simulate(experiment, &set(given, resolution, experiment.duration()), resolution)
         }),
     };
-    vec![
-        method("cosserat-rod", [tolerances, grids(&cells, &stages, steps)].concat()),
-        method("cosserat-rod on given cells", on_cells),
-    ]
+    let resolutions = [tolerances(&asked(&TOLERANCES)), grids(&cells, &stages, steps)].concat();
+    let mut methods = vec![method("cosserat-rod", resolutions)];
+    // a step that is given leaves no other, and no part of the budget to it
+    if given.step == 0.0 {
+        let steps = asked(&STEP_TOLERANCES).into_iter().map(Steps::To);
+        methods.push(method("cosserat-rod on given cells", grids(&cells, &stages, steps)));
+    }
+    methods
 }
 
 /// The parameters of a resolution; equal steps are as given, or as many to the end of `duration`, s.
