@@ -54,11 +54,9 @@ const PLANE_SHARE: Share = Share { part: 0.09, power: 0.15 };
 /// One of order 2 may leave as much as that.
 const ITERATED: f64 = 0.5;
 /// Estimated error of steps of order 2 in the time that gravity or stiffness take to move the whole rod, over the tolerance.
-const SIMPLE_SHARE: Share = Share { part: 1.9, power: 0.15 };
+const SIMPLE_SHARE: Share = Share { part: 2.4, power: 0.15 };
 /// Tolerance below which steps in a plane are of order 5.
 const FINE: f64 = 5e-5;
-/// How much longer steps of order 2 may be with every interval that one of order 4 has passed.
-const HOPE: f64 = 1.2;
 /// The first step over that time: short enough to be accepted, and the next ones follow their error.
 const FIRST_STEP: f64 = 1.0 / 80.0;
 /// The shortest step of order 4 over the step of generalized-α for the same tolerance, in space.
@@ -196,9 +194,14 @@ impl Pace {
 
     /// Whether a step of `dt` s with the estimated error `error` is good enough; and sets the next one.
     fn allows(&mut self, dt: f64, error: f64) -> bool {
+        self.see(dt, error) <= 1.0
+    }
+
+    /// Sets the next step by what one of `dt` s would err by; and tells that as a part of what it may.
+    fn see(&mut self, dt: f64, error: f64) -> f64 {
         let part = error / self.allowed;
         self.next = dt * stretch(part, self.order);
-        part <= 1.0
+        part
     }
 }
 
@@ -763,8 +766,9 @@ impl Integrator {
             };
             match outcome {
                 Outcome::Taken => {
-                    if !simple && dt == duration {
-                        self.simple.next *= HOPE;
+                    if !simple {
+                        let error = self.stepper.simple_error();
+                        self.pace_of(&TR_BDF2, dt).see(dt, error);
                     }
                 }
                 Outcome::TooCoarse(changed) => {

@@ -448,7 +448,7 @@ impl Stepper {
             self.take_carried(i);
             work = work.plus(Powers::of(&self.mesh, &self.rod, &self.trial, &boundary), h * method.weight(i));
         }
-        let error = self.error(h);
+        let error = self.displacement(|j| method.error_weight(j));
         if !(self.trial.is_finite() && error.is_finite()) {
             return Err(Diverged { iterations, residual: error, reason: Reason::NotFinite });
         }
@@ -623,15 +623,20 @@ impl Stepper {
         }
     }
 
-    /// How far the difference of the step and the embedded one moves a node, over the length.
-    fn error(&self, h: f64) -> f64 {
-        let Self { mesh, old, stages, method, .. } = self;
+    /// What a step of order 2 in the place of the one last attempted would be estimated to err by, as [`Attempt::error`].
+    pub fn simple_error(&self) -> f64 {
+        self.displacement(|j| self.method.simple_weight(j))
+    }
+
+    /// How far the θ_t of the stages of the step last attempted, added up with these weights, move a node, over the length.
+    fn displacement(&self, weight: impl Fn(usize) -> f64) -> f64 {
+        let Self { mesh, old, stages, method, span: h, .. } = self;
         let mut way = Vector3::zeros();
         let mut most = 0.0f64;
         let per_cell = mesh.rule.stages;
         for (m, section) in old.points.iter().enumerate() {
             let theta = (0..method.stages).fold(Vector3::zeros(), |sum, j| {
-                sum + stages[j * old.memory.len() + m].theta_t * (h * method.error_weight(j))
+                sum + stages[j * old.memory.len() + m].theta_t * (h * weight(j))
             });
             let length = mesh.cells[m / per_cell].length * mesh.rule.b[m % per_cell];
             way += section.rotation * theta.cross(&Vector3::z()) * length;
