@@ -5,7 +5,7 @@
 //!
 //! - in its plane ([`crate::plane`]), as long as it lies and moves in one and all that acts on it leaves it there;
 //! - else in space ([`Stepper::attempt`]), where a step that Newton loses is shortened, and the shortest of all taken by
-//!   implicit Euler, which damps what it cannot follow.
+//!   implicit Euler, which damps what it cannot follow; cells that lose that too are halved.
 //!
 //! Where the length of the steps is given, and for a rod that shears and stretches, they are generalized-α in space. One
 //! of those that diverges is halved, and its halves again if need be; if that does not help either, the rod is as it was
@@ -434,7 +434,7 @@ impl Integrator {
         self.leave_plane();
         if let Some((refiner, _)) = &mut self.refiners {
             // cells that cannot be started stay as they were
-            if refiner.halve(&mut self.stepper, boundary, longest) == Ok(true) {
+            if refiner.halve(&mut self.stepper, boundary, longest, false) == Ok(true) {
                 self.see_energy(&boundary.gravity);
             }
         }
@@ -778,7 +778,11 @@ impl Integrator {
                 Outcome::TooLong if simple || dt > shortest => continue,
                 Outcome::TooLong => {
                     self.pace.next = shortest;
-                    dt = self.fall(drive, time, dt, rest)?;
+                    dt = match self.fall(drive, time, dt, rest) {
+                        Ok(dt) => dt,
+                        Err(_) if self.halve(&drive(time).boundary) => continue,
+                        Err(failed) => return Err(failed),
+                    };
                 }
             }
             time = if dt == rest { duration } else { time + dt };
@@ -787,6 +791,19 @@ impl Integrator {
             }
         }
         Ok(())
+    }
+
+    /// Halves the longest cells of a rod in space that no step brings on, if they are too coarse and there is room; whether
+    /// that was so.
+    fn halve(&mut self, now: &Boundary) -> bool {
+        let Self { stepper, refiners: Some((refiner, _)), .. } = self else { return false };
+        let longest = stepper.mesh.cells.iter().map(|cell| cell.length).fold(0.0, f64::max);
+        let halved = refiner.is_coarse(stepper) && refiner.halve(stepper, now, 0.5 * longest, true) == Ok(true);
+        if halved {
+            self.see_energy(&now.gravity);
+            self.note_cells();
+        }
+        halved
     }
 
     /// Takes a step of implicit Euler from `time` on where one of `shortest` s is not good enough otherwise, in an interval of

@@ -140,6 +140,17 @@ fn legendre(n: usize, x: f64) -> f64 {
     last
 }
 
+/// What the curvatures of new cells are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Curvatures {
+    /// Those with which the accelerations stay what they were.
+    Settled,
+    /// Those that the moments at the first nodes ask for.
+    Balanced,
+    /// What they were.
+    Kept,
+}
+
 /// Where a cell of a new mesh lies in the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {

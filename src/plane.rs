@@ -31,7 +31,7 @@ use crate::alpha::Motion;
 use crate::archive::{Archive, Archived, Corrupt, archived};
 use crate::boundary::{Boundary, Drive, Held, Support};
 use crate::energy::{Energy, Powers};
-use crate::mesh::{self, Gauss, MAX_STAGES, Mesh, Origin, Series};
+use crate::mesh::{self, Curvatures, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::pose::{self, Memory, State};
 use crate::rod::Rod;
 use crate::rosenbrock::Rosenbrock;
@@ -414,6 +414,8 @@ pub(crate) struct Bending {
     pub(crate) tangent: Vec3,
     /// Largest |n|, N.
     pub(crate) force: f64,
+    /// Largest |a + ν u| of the nodes, m/s².
+    pub(crate) acceleration: f64,
     /// Distance of the tip, m.
     pub(crate) lever: f64,
     /// From end to end, rad.
@@ -661,8 +663,8 @@ impl Plane {
     }
 
     /// Exchanges the cells for those with these origins in them, and solves for the accelerations as [`Self::start`], if the
-    /// energy that the rod then has `fits`; tells whether. At the points of the new cells the curvature is what the balance
-    /// of moments asks for if it is to be `balanced`, else what it was; and its rate what it was. The rod is one looked at.
+    /// energy that the rod then has `fits`; tells whether. The rates of the curvatures are what they were. The rod is one
+    /// looked at.
     ///
     /// # Errors
     /// [`Singular`] as of [`Self::start`]; the rod is as before.
@@ -671,15 +673,19 @@ impl Plane {
         cells: &mut Vec<mesh::Cell>,
         (origins, series): (&[Origin], &Series),
         drive: &Drive,
-        balanced: bool,
+        curvatures: Curvatures,
         fits: impl FnOnce(&Energy) -> bool,
     ) -> Result<bool, Singular> {
-        self.transfer(cells, origins, series, balanced);
+        self.transfer(cells, origins, series, curvatures);
         self.exchange(cells);
-        let taken = self.start(drive).map(|()| {
-            self.look(1.0, drive);
-            fits(&self.energy())
-        });
+        let settles = curvatures == Curvatures::Settled;
+        let taken = match settles && self.solve(drive, true).is_err() {
+            true => Ok(false),
+            false => self.start(drive).map(|()| {
+                self.look(1.0, drive);
+                fits(&self.energy())
+            }),
+        };
         if taken != Ok(true) {
             self.exchange(cells);
             self.stand(drive);
@@ -689,26 +695,30 @@ impl Plane {
     }
 
     /// The points on other cells, in `next`, of the rod as it is looked at.
-    fn transfer(&mut self, cells: &[mesh::Cell], origins: &[Origin], series: &Series, balanced: bool) {
-        let [mut angle, mut rate, _] = self.fields[0].node.angle;
+    fn transfer(&mut self, cells: &[mesh::Cell], origins: &[Origin], series: &Series, curvatures: Curvatures) {
+        let mut node = self.fields[0].node.angle;
         self.next.clear();
         for (origin, cell) in origins.iter().zip(cells) {
-            let mut strain = [Lane::default(); 2];
+            let mut strain = Points::default();
             match *origin {
-                Origin::Same(old) => strain.copy_from_slice(&self.fields[old].strain[..2]),
+                Origin::Same(old) => strain = self.fields[old].strain,
                 Origin::First(old) | Origin::Second(old) => {
                     let stages = self.mesh.rule.stages;
                     let bounded = |bending: Bending| {
                         let most = bending.most(stages);
                         bending.missed.clamp(-most, most)
                     };
-                    let missed = if balanced { bounded(self.bending(old, series)) } else { 0.0 };
+                    let missed = match curvatures {
+                        Curvatures::Kept => 0.0,
+                        Curvatures::Settled | Curvatures::Balanced => bounded(self.bending(old, series)),
+                    };
                     for k in 0..stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);
                         let through = self.mesh.rule.through(theta);
-                        let [g, g_t, _] = &self.fields[old].strain;
-                        strain[0][k] = total(&through, g) + self.mesh.rule.beside(theta) * missed;
-                        strain[1][k] = total(&through, g_t);
+                        for (strain, g) in strain.iter_mut().zip(&self.fields[old].strain) {
+                            strain[k] = total(&through, g);
+                        }
+                        strain[0][k] += self.mesh.rule.beside(theta) * missed;
                     }
                 }
                 Origin::Pair(old) => {
@@ -720,12 +730,13 @@ impl Plane {
                     }
                 }
             }
-            let [turn, turn_t] =
-                strain.map(|g| spread::<MAX_STAGES>(&self.rule.forward, &g).map(|sum| cell.length * sum));
-            let shifted = |by: f64, turn: Lane| lane(|k| if k < self.mesh.rule.stages { by + turn[k] } else { 0.0 });
-            self.next.push([shifted(angle, turn), shifted(rate, turn_t), Lane::default()]);
-            angle += cell.length * total(&self.rule.b, &strain[0]);
-            rate += cell.length * total(&self.rule.b, &strain[1]);
+            self.next.push(from_fn(|q| {
+                let turn = spread::<MAX_STAGES>(&self.rule.forward, &strain[q]);
+                lane(|k| if k < self.mesh.rule.stages { node[q] + cell.length * turn[k] } else { 0.0 })
+            }));
+            for (node, strain) in node.iter_mut().zip(&strain) {
+                *node += cell.length * total(&self.rule.b, strain);
+            }
         }
     }
 
@@ -746,6 +757,8 @@ impl Plane {
         let size = |[x, y]: [f64; 2]| (x * x + y * y).sqrt();
         let points = field.moment.map(|m| m * per_stiffness);
         let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let gravity = self.frame.part(&self.looked_at.gravity);
+        let accelerated = |node: &Node| size(from_fn(|i| node.acceleration[i] + gravity[i]));
         Bending {
             missed: field.node.moment * per_stiffness - total(&series.start, &points),
             coefficients: series.coefficients(&points),
@@ -754,6 +767,7 @@ impl Plane {
             curvature: largest(&field.strain[0]),
             tangent: Vec3::new(field.cos[self.mesh.rule.stages / 2], field.sin[self.mesh.rule.stages / 2], 0.0),
             force: size(field.node.force).max(size(next.force)),
+            acceleration: accelerated(&field.node).max(accelerated(next)),
             lever: size(from_fn(|i| self.tip.position[i] - field.node.position[i])),
             turn: (next.angle[0] - field.node.angle[0]).abs(),
         }
@@ -806,14 +820,20 @@ impl Plane {
     /// # Errors
     /// [`Singular`] names the first cell, seen from the tip, that cannot be solved.
     pub fn start(&mut self, drive: &Drive) -> Result<(), Singular> {
-        match self.mesh.rule.stages {
-            1 => self.start_by::<1>(drive),
-            2 => self.start_by::<2>(drive),
-            3 => self.start_by::<3>(drive),
-            _ => self.start_by::<4>(drive),
-        }?;
+        self.solve(drive, false)?;
         self.stand(drive);
         Ok(())
+    }
+
+    /// Solves the equations of motion for the angular accelerations, or, of a rod that `settles`, in one iteration for the
+    /// angles at which it has those that it has.
+    fn solve(&mut self, drive: &Drive, settles: bool) -> Result<(), Singular> {
+        match self.mesh.rule.stages {
+            1 => self.solve_by::<1>(drive, settles),
+            2 => self.solve_by::<2>(drive, settles),
+            3 => self.solve_by::<3>(drive, settles),
+            _ => self.solve_by::<4>(drive, settles),
+        }
     }
 
     /// The present becomes a start.
@@ -825,18 +845,25 @@ impl Plane {
         self.look(1.0, drive);
     }
 
-    fn start_by<const K: usize>(&mut self, drive: &Drive) -> Result<(), Singular> {
+    fn solve_by<const K: usize>(&mut self, drive: &Drive, settles: bool) -> Result<(), Singular> {
         let ends = self.ends_of(drive, &self.ends);
         self.begin::<K>();
         for stage in &mut self.stages {
-            (stage.points[2], stage.p, stage.q) = Default::default();
+            (stage.p, stage.q) = Default::default();
+            if !settles {
+                stage.points[2] = Lane::default();
+            }
         }
         self.residuals::<K>(&ends, 0.0, 0.0, 0.0);
-        self.factorise::<K>([0.0, 0.0, 1.0])?;
+        self.factorise::<K>(if settles { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] })?;
         self.carry::<K>([0.0; 3]);
         let mut node = [0.0; 3];
         for ((points, start), stage) in self.now.iter_mut().zip(&self.starts).zip(&self.stages) {
-            points[2] = follow::<K>(&self.rule, start, &stage.u, &mut node);
+            let found = follow::<K>(&self.rule, start, &stage.u, &mut node);
+            match settles {
+                true => add_scaled(&mut points[0], 1.0, &found),
+                false => points[2] = found,
+            }
         }
         Ok(())
     }
@@ -1760,6 +1787,37 @@ mod tests {
 
     fn largest(values: impl Iterator<Item = f64>) -> f64 {
         values.map(f64::abs).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn sections_settle_where_the_accelerations_are_theirs() {
+        let mesh = Mesh::uniform(1.0, 3, 4, Vec3::zeros());
+        let mut base = Support::at_rest(Vec3::zeros(), Mat3::from_diagonal(&Vec3::new(-1.0, 1.0, -1.0)));
+        base.acceleration.x = 2.0;
+        let drive = Drive {
+            boundary: Boundary::hanging_from(base, Vec3::z() * -9.81),
+            rates: crate::boundary::Rates::default(),
+        };
+        let mut plane = Plane::of(&mesh, &rod(0.1, 0.1), &drive, &RODAS4).expect("a plane rod");
+        let mut random = Random(5);
+        // bent to an arc, and turning
+        for (j, points) in plane.now.iter_mut().enumerate() {
+            for k in 0..4 {
+                points[0][k] += 0.1 * (j as f64 + plane.mesh.rule.c[k]);
+                points[1][k] = 0.1 * random.next();
+            }
+        }
+        plane.start(&drive).unwrap();
+        let settled = plane.now.clone();
+        let way: Vec<Points> = (0..3).map(|_| [lane(|_| random.next()), Lane::default(), Lane::default()]).collect();
+        // Newton from there: what is left goes with the square
+        let [left, of_half] = [1e-3, 5e-4].map(|size| {
+            plane.now = moved(&settled, &way, size);
+            plane.solve(&drive, true).unwrap();
+            let differences = plane.now.iter().zip(&settled).flat_map(|(a, b)| lane(|k| a[0][k] - b[0][k]));
+            largest(differences)
+        });
+        assert!(left < 3e-5 && (3.8..4.2).contains(&(left / of_half)), "{left:e}, {of_half:e}");
     }
 
     fn exact<const K: usize>(cells: usize, rod: &Rod) {

@@ -28,6 +28,12 @@
 //! square best approximation. All that leaves the tip and its velocity where they are, to the order of e. Still a change
 //! raises some waves, and is the better for being made in time: cells are halved before they have used up what the
 //! tolerance allows, and joined long after; a step that leaves too little is taken anew on finer ones.
+//!
+//! Where a rod in a plane moves slowly its curvatures follow what acts, and those with which the new cells have the
+//! accelerations of the old ones raise no waves at all. One iteration finds them; that the rod is slow is seen by its energy,
+//! which then changes by the order of e². And what the cells of such a rod miss displaces the tip, and sets nothing in
+//! motion: it may be as much more as its accelerations are less than L/T², in the time T in which gravity or stiffness
+//! move the whole rod.
 
 // J is a matrix
 #![allow(non_snake_case)]
@@ -35,7 +41,7 @@
 use crate::archive::archived;
 use crate::boundary::{Boundary, Drive};
 use crate::energy::Energy;
-use crate::mesh::{Cell, Gauss, MAX_STAGES, Mesh, Origin, Series};
+use crate::mesh::{Cell, Curvatures, Gauss, MAX_STAGES, Mesh, Origin, Series};
 use crate::plane::{Bending, Plane};
 use crate::pose::{Section, State};
 use crate::rod::Rod;
@@ -53,6 +59,18 @@ const CALIBRATION: f64 = 2.0;
 /// Part of the tolerance that the cells may use up before those with more than their share of it are halved. With a tenth a
 /// hair that whips raises more waves by its changes than it is the more exact.
 const SHARE: f64 = 0.17;
+/// Tolerance from which on that part grows with its root: the steps then err more than the cells.
+const LOOSE: f64 = 1e-3;
+/// That part at most: the steps err too.
+const MOST_SHARE: f64 = 1.5;
+/// How much more the cells of a slow rod may use up. With 9 a cord that begins to turn is off by 3 tolerances: in space
+/// changes raise waves.
+const QUIET: f64 = 3.0;
+/// The same in a plane.
+const QUIET_IN_PLANE: f64 = 9.0;
+/// Energy, relative, by which new cells may change that of a slow rod, over the square of what the cells may use up: up to 10
+/// in a line that hangs from a ship, 1e3 and more at a release or in a whip.
+const SETTLED: f64 = 10.0;
 /// Part of its share that a pair of cells must keep below once joined: the waves that a change raises count the more, the
 /// less may be amiss.
 const JOINED: Share = Share { part: 0.22, power: 0.25 };
@@ -68,9 +86,8 @@ const BROUGHT: f64 = 4.0;
 const WILD: f64 = 0.02;
 /// The same where a step needs them: a rod that is wound up at once must have some that bring 5 times what it has.
 const WILD_AT_NEED: f64 = 10.0;
-/// Times what the cells may use up from which a step needs others: one that winds the rod up comes to 1e4 times, in a whip it
-/// is 3 times.
-const NEED: f64 = 100.0;
+/// Estimate, over the tolerance, from which a step needs others: one that winds the rod up comes to 2e3, in a whip it is 0.5.
+const NEED: f64 = 17.0;
 /// How much more what is missed of the bending of a rod at rest counts than of one in motion: there one sees the cells change.
 const AT_REST: f64 = 10.0;
 /// Tolerance beyond which shares grow no more: a rod need not be followed, but no energy may come of it.
@@ -108,8 +125,8 @@ impl Share {
 enum By {
     /// The energy that they bring, and that is this at most, relative.
     Energy(f64),
-    /// Whether they are to be those that the moments ask for.
-    Order(bool),
+    /// What they are to be.
+    Order(Curvatures),
 }
 
 /// A change of the cells.
@@ -117,8 +134,7 @@ enum By {
 pub struct Change {
     /// Of which the new ones come.
     origins: Vec<Origin>,
-    /// Whether their curvatures are those that the moments ask for.
-    balanced: bool,
+    curvatures: Curvatures,
 }
 
 /// What the cells of a rod contribute to the error of its tip, and which they ought to be.
@@ -126,6 +142,10 @@ pub struct Change {
 pub struct Refiner {
     /// Of the position of the tip, over the length.
     tolerance: f64,
+    /// Accelerations below which a rod is slow, m/s².
+    slow: f64,
+    /// How much more the cells may use up, as slow as the rod is.
+    quiet: f64,
     most_cells: usize,
     /// Calls since the last change.
     waited: u32,
@@ -145,26 +165,30 @@ pub struct Refiner {
     /// The next cells, and those of which they come.
     cells: Vec<Cell>,
     origins: Vec<Origin>,
-    balanced: bool,
+    curvatures: Curvatures,
     series: Series,
     kept: Vec<f64>,
 }
 
 archived!(Refiner { waited, lately } but {
-    tolerance, most_cells, coarsest, rule, errors, sums, turns, seen, places, cells, origins, balanced, series, kept
+    tolerance, slow, quiet, most_cells, coarsest, rule, errors, sums, turns, seen, places, cells, origins, curvatures, series,
+    kept
 });
 
 impl Refiner {
     /// For rods on `coarsest`, or what becomes of it: none of its cells will be joined, and there will be `most_cells` at
-    /// most. `tolerance` is that of the tip's position, over the length.
+    /// most. `tolerance` is that of the tip's position, over the length; rods with smaller accelerations than `slow`, m/s²,
+    /// have fewer.
     ///
     /// A rod at rest may be straight, and tells nothing of what will come: the step that tells is to be
     /// [refused](Self::refuse). Otherwise the first blow to a hanging cord of one cell costs 4e-3 of its length.
-    pub fn new(coarsest: &Mesh, tolerance: f64, most_cells: usize) -> Self {
+    pub fn new(coarsest: &Mesh, tolerance: f64, slow: f64, most_cells: usize) -> Self {
         let most_cells = most_cells.max(coarsest.cells.len());
         let room = || Vec::with_capacity(most_cells);
         Self {
             tolerance,
+            slow,
+            quiet: 1.0,
             most_cells,
             coarsest: coarsest.cells.clone(),
             waited: REST,
@@ -179,7 +203,7 @@ impl Refiner {
             places: Vec::with_capacity(most_cells),
             cells: Vec::with_capacity(most_cells),
             origins: Vec::with_capacity(most_cells),
-            balanced: true,
+            curvatures: Curvatures::Kept,
         }
     }
 
@@ -214,7 +238,7 @@ impl Refiner {
 
     /// The last change.
     pub fn last_change(&self) -> Change {
-        Change { origins: self.origins.clone(), balanced: self.balanced }
+        Change { origins: self.origins.clone(), curvatures: self.curvatures }
     }
 
     /// Changes the cells as [`adapt`](Self::adapt) or [`refuse`](Self::refuse) once did.
@@ -223,7 +247,7 @@ impl Refiner {
     /// [`Diverged`] as of [`Self::adapt`].
     pub fn change_to(&mut self, change: &Change, stepper: &mut Stepper, now: &Boundary) -> Result<(), Diverged> {
         self.set_cells(&change.origins, &stepper.mesh);
-        self.change(stepper, now, By::Order(change.balanced))
+        self.change(stepper, now, By::Order(change.curvatures))
     }
 
     /// The same of a rod in a plane.
@@ -232,7 +256,7 @@ impl Refiner {
     /// [`Diverged`] as of [`Self::adapt_plane`].
     pub fn change_plane_to(&mut self, change: &Change, plane: &mut Plane, now: &Drive) -> Result<(), Diverged> {
         self.set_cells(&change.origins, plane.mesh());
-        self.change_plane(plane, now, By::Order(change.balanced))
+        self.change_plane(plane, now, By::Order(change.curvatures))
     }
 
     fn set_cells(&mut self, origins: &[Origin], mesh: &Mesh) {
@@ -252,11 +276,16 @@ impl Refiner {
         self.estimate_state(stepper, &stepper.state, 1.0)
     }
 
+    /// Whether the present cells use up more than they may.
+    pub fn is_coarse(&mut self, stepper: &Stepper) -> bool {
+        self.estimate_space(stepper) > self.allowed()
+    }
+
     /// Of any state of the rod; what is missed `counts` so many times.
     fn estimate_state(&mut self, stepper: &Stepper, state: &State, counts: f64) -> f64 {
         let Stepper { mesh, rod, .. } = stepper;
         let stages = mesh.rule.stages;
-        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), counts, |series, j| {
+        self.estimate(mesh, rod.stiffness.x.min(rod.stiffness.y), (counts, QUIET), |series, j| {
             bending(rod, state, stages, series, j).0
         })
     }
@@ -267,7 +296,8 @@ impl Refiner {
         if self.seen == Some(plane.looks()) {
             return self.estimated();
         }
-        let error = self.estimate(plane.mesh(), plane.stiffness(), 1.0, |series, j| plane.bending(j, series));
+        let quiet = (1.0, QUIET_IN_PLANE);
+        let error = self.estimate(plane.mesh(), plane.stiffness(), quiet, |series, j| plane.bending(j, series));
         self.seen = Some(plane.looks());
         error
     }
@@ -276,7 +306,7 @@ impl Refiner {
         &mut self,
         mesh: &Mesh,
         stiffness: f64,
-        counts: f64,
+        (counts, most_quiet): (f64, f64),
         bending: impl Fn(&Series, usize) -> Bending,
     ) -> f64 {
         let (length, stages) = (mesh.length(), mesh.rule.stages as i32);
@@ -284,10 +314,12 @@ impl Refiner {
         self.errors.clear();
         self.sums.clear();
         self.turns.clear();
-        let mut all = Vec3::zeros();
+        let (mut all, mut fastest) = (Vec3::zeros(), 0.0);
         for (j, Cell { length: h, .. }) in mesh.cells.iter().enumerate() {
             let bending = bending(&self.series, j);
-            let Bending { missed, at_points, at_nodes, curvature, tangent, force, lever, turn, .. } = bending;
+            let Bending { missed, at_points, at_nodes, curvature, tangent, force, acceleration, lever, turn, .. } =
+                bending;
+            fastest = larger(fastest, acceleration);
             let missed = (missed * missed).min(bending.next(mesh.rule.stages)) / f64::from(2 * stages + 1);
             let arm = length.min(lever).min((stiffness / force).sqrt());
             // nothing is missed of what is not bent
@@ -298,6 +330,7 @@ impl Refiner {
             self.sums.push(missed.norm());
             self.turns.push(turn);
         }
+        self.quiet = (self.slow / larger(fastest, f64::MIN_POSITIVE)).clamp(1.0, most_quiet);
         let left = all.norm() / larger(self.sums.iter().sum(), f64::MIN_POSITIVE);
         for (error, sum) in self.errors.iter_mut().zip(&self.sums) {
             *error += left * sum;
@@ -418,11 +451,18 @@ impl Refiner {
     }
 
     /// Halves the cells of a rod as for [`Self::adapt`] until none is longer than `longest`, m, as far as there is room;
-    /// whether they have changed.
+    /// whether they have changed. They may bring more energy if the rod `needs` them.
     ///
     /// # Errors
     /// [`Diverged`] if the equations of a cell are singular; the rod then has the cells that it got to.
-    pub fn halve(&mut self, stepper: &mut Stepper, boundary: &Boundary, longest: f64) -> Result<bool, Diverged> {
+    pub fn halve(
+        &mut self,
+        stepper: &mut Stepper,
+        boundary: &Boundary,
+        longest: f64,
+        needs: bool,
+    ) -> Result<bool, Diverged> {
+        let wild = if needs { WILD_AT_NEED } else { WILD };
         let mut changed = false;
         loop {
             self.estimate_space(stepper);
@@ -436,7 +476,7 @@ impl Refiner {
                 return Ok(changed);
             }
             self.kept.fill(0.0);
-            self.change(stepper, boundary, By::Energy(WILD))?;
+            self.change(stepper, boundary, By::Energy(wild))?;
             changed = true;
         }
     }
@@ -452,7 +492,7 @@ impl Refiner {
         if !self.refuses(&stepper.mesh, REFUSED) {
             return Ok(false);
         }
-        let wild = if self.estimated() > NEED * self.allowed() { WILD_AT_NEED } else { WILD };
+        let wild = if self.estimated() > NEED * self.tolerance { WILD_AT_NEED } else { WILD };
         self.change(stepper, boundary, By::Energy(wild))?;
         Ok(true)
     }
@@ -482,34 +522,39 @@ impl Refiner {
 
     /// The error that the cells may have, all together.
     fn allowed(&self) -> f64 {
-        SHARE * self.tolerance
+        let share = SHARE * (self.tolerance.clamp(LOOSE, ROUGH) / LOOSE).sqrt();
+        (share * self.quiet).min(MOST_SHARE) * self.tolerance
     }
 
-    /// Whether the curvatures of new cells are those that the moments ask for, and the energy, relative, that they may bring
-    /// then: in the order in which that is tried.
-    fn tries(&self, by: By) -> [(bool, f64); 2] {
-        match by {
+    /// What the curvatures of new cells are, and the energy, relative, that they may bring then: in the order in which that is
+    /// tried.
+    fn tries(&self, by: By, planar: bool) -> impl Iterator<Item = (Curvatures, f64)> + use<> {
+        let tries = match by {
             By::Energy(wild) => {
                 let most = larger(self.allowed(), (BROUGHT * self.estimated()).min(SHARE * ROUGH));
-                [(true, most.min(wild)), (false, wild)]
+                let settled = SETTLED * self.allowed().powi(2);
+                let tries = [(Curvatures::Settled, settled), (Curvatures::Balanced, most), (Curvatures::Kept, wild)];
+                tries.map(|(curvatures, most)| (curvatures, most.min(wild)))
             }
-            By::Order(balanced) => [(balanced, f64::INFINITY); 2],
-        }
+            By::Order(curvatures) => [(curvatures, f64::INFINITY); 3],
+        };
+        let settles = planar && self.quiet > 1.0;
+        tries.into_iter().skip(usize::from(!settles))
     }
 
     fn change_plane(&mut self, plane: &mut Plane, drive: &Drive, by: By) -> Result<(), Diverged> {
         plane.look(1.0, drive);
         let energy = plane.energy();
-        let (scale, tries) = (energy.scale(plane.large()), self.tries(by));
+        let (scale, tries) = (energy.scale(plane.large()), self.tries(by, true));
         let Self { cells, origins, series, .. } = self;
         let mut gain = 0.0;
-        for (balanced, most) in tries {
+        for (curvatures, most) in tries {
             let fits = |after: &Energy| {
                 gain = (after.total() - energy.total()) / scale;
-                gain <= most
+                gain <= most && (curvatures != Curvatures::Settled || -gain <= most)
             };
-            if plane.remesh(cells, (origins, series), drive, balanced, fits).map_err(singular)? {
-                self.balanced = balanced;
+            if plane.remesh(cells, (origins, series), drive, curvatures, fits).map_err(singular)? {
+                self.curvatures = curvatures;
                 self.changed();
                 return Ok(());
             }
@@ -550,7 +595,7 @@ impl Refiner {
             }
             // not those that it did not get to: loads go on from them
             let reached = stepper.state.boundary;
-            self.change(stepper, &reached, By::Order(true))?;
+            self.change(stepper, &reached, By::Order(Curvatures::Balanced))?;
         }
     }
 
@@ -559,18 +604,18 @@ impl Refiner {
         let gravity = &boundary.gravity;
         let energy = Energy::of(mesh, rod, state, gravity);
         let scale = energy.scale(Energy::large(rod, mesh.length(), gravity));
-        let tries = self.tries(by);
+        let mut tries = self.tries(by, false);
         let Self { cells, origins, series, .. } = self;
         let (mesh, rod, before, state) = stepper.remesh(cells);
         let mut gain = 0.0;
-        let taken = tries.into_iter().find(|(balanced, most)| {
-            transfer((cells, before), (origins, series), (mesh, state), rod, *balanced);
+        let taken = tries.find(|(curvatures, most)| {
+            transfer((cells, before), (origins, series), (mesh, state), rod, *curvatures);
             gain = (Energy::of(mesh, rod, state, gravity).total() - energy.total()) / scale;
             gain <= *most
         });
         let started = match taken {
-            Some((balanced, _)) => {
-                self.balanced = balanced;
+            Some((curvatures, _)) => {
+                self.curvatures = curvatures;
                 stepper.accelerate(boundary)
             }
             None => Err(Diverged { iterations: 0, residual: gain, reason: Reason::Elsewhere }),
@@ -615,6 +660,7 @@ fn bending(rod: &Rod, state: &State, stages: usize, series: &Series, cell: usize
         curvature: kappa.fold(0.0, larger),
         tangent: state.points[middle].rotation * (tangent - axis * axis.z),
         force: larger(node.force.norm(), next.force.norm()),
+        acceleration: larger(node.acceleration.norm(), next.acceleration.norm()),
         lever: (state.tip().position - node.position).norm(),
         turn: next.turn.norm(),
     };
@@ -711,14 +757,14 @@ fn spin(omega: &Vec3, phi: &Vec3, phi_t: &Vec3) -> Vec3 {
     so3::right_jacobian(phi) * phi_t + so3::exp(phi).tr_mul(omega)
 }
 
-/// Puts the rod on another mesh: at the points of new cells its curvature is what the balance of moments asks for if it is
-/// to be `balanced`, else what it was, and the rate of that what it was. All but the accelerations follow.
+/// Puts the rod on another mesh, with the rates of the curvatures as they were. All but the accelerations follow; those that
+/// were settled in a plane are balanced here.
 fn transfer(
     before: (&[Cell], &State),
     (origins, series): (&[Origin], &Series),
     (mesh, state): (&Mesh, &mut State),
     rod: &Rod,
-    balanced: bool,
+    curvatures: Curvatures,
 ) {
     let (rule, stages, old) = (&mesh.rule, mesh.rule.stages, before.1);
     (state.boundary, state.dt, state.scheme, state.row) = (old.boundary, 0.0, old.scheme, old.row);
@@ -734,7 +780,7 @@ fn transfer(
         let shape = match *origin {
             Origin::Same(_) => shape,
             _ => {
-                let missed = match balanced && next.is_none() {
+                let missed = match curvatures != Curvatures::Kept && next.is_none() {
                     true => {
                         let (bending, missed) = bending(rod, old, stages, series, first);
                         missed * (bending.most(stages) / bending.missed).min(1.0)

@@ -207,7 +207,8 @@ mod tests {
             assert!((TR_BDF2.simple_weight(j) - TR_BDF2.error_weight(j)).abs() < 1e-15, "{j}");
         }
         for method in METHODS {
-            let moment = |power| (0..method.stages).map(|j| method.simple_weight(j) * method.c[j].powi(power)).sum::<f64>();
+            let moment =
+                |power| (0..method.stages).map(|j| method.simple_weight(j) * method.c[j].powi(power)).sum::<f64>();
             assert!(moment(0).abs() < 1e-15 && moment(1).abs() < 1e-15 && (moment(2) - CURVED).abs() < 1e-15);
         }
     }

@@ -635,9 +635,8 @@ impl Stepper {
         let mut most = 0.0f64;
         let per_cell = mesh.rule.stages;
         for (m, section) in old.points.iter().enumerate() {
-            let theta = (0..method.stages).fold(Vector3::zeros(), |sum, j| {
-                sum + stages[j * old.memory.len() + m].theta_t * (h * weight(j))
-            });
+            let theta = (0..method.stages)
+                .fold(Vector3::zeros(), |sum, j| sum + stages[j * old.memory.len() + m].theta_t * (h * weight(j)));
             let length = mesh.cells[m / per_cell].length * mesh.rule.b[m % per_cell];
             way += section.rotation * theta.cross(&Vector3::z()) * length;
             if m % per_cell == per_cell - 1 {

@@ -273,7 +273,7 @@ fn a_change_of_cells_allocates_nothing() {
     for stages in 1..=4 {
         let mesh = Mesh::uniform(1.0, 3, stages, Vector3::zeros());
         // halves all there is, and joins what there is
-        let mut refiners = [0.0, f64::INFINITY].map(|tolerance| Refiner::new(&mesh, tolerance, 12));
+        let mut refiners = [0.0, f64::INFINITY].map(|tolerance| Refiner::new(&mesh, tolerance, 0.0, 12));
         let mut stepper = Stepper::new(mesh.clone(), rod.clone(), State::at_rest_shape(&mesh, &boundary.base));
         let backup = stepper.state.clone();
         stepper.reserve(12);

@@ -30,9 +30,9 @@ const CHEAPEST: [(Scene, &[Setting]); 7] = [
     (Scene::Rope, &[(3, 4, 3e-1), (8, 4, 3e-1), (12, 4, 3e-1), (16, 4, 3e-5)]),
     (Scene::Wire, &[(1, 3, 3e-1), (1, 3, 3e-1), (1, 4, 3e-1), (2, 3, 3e-1), (3, 4, 3e-6)]),
     (Scene::Pulse, &[(4, 3, 3e-1), (8, 3, 1e-3), (12, 3, 1e-4), (12, 4, 1e-5), (16, 4, 3e-6)]),
-    (Scene::Spring, &[(12, 1, 1e-1), (12, 1, 1e-1), (16, 2, 1e-4), (12, 3, 3e-5)]),
+    (Scene::Spring, &[(9, 1, 3e-1), (9, 1, 3e-1), (14, 2, 1e-4), (11, 3, 3e-5)]),
     (Scene::Hair, &[(4, 4, 3e-1), (8, 4, 3e-1), (12, 4, 1e-4), (24, 4, 3e-5)]),
-    (Scene::Spin, &[(2, 2, 3e-1), (2, 3, 3e-4), (4, 3, 3e-5), (6, 3, 3e-6), (12, 3, 3e-7)]),
+    (Scene::Spin, &[(2, 2, 3e-1), (2, 3, 3e-4), (4, 3, 3e-5), (6, 3, 3e-6), (10, 3, 3e-7)]),
     (Scene::Umbilical, &[(1, 3, 3e-1), (1, 4, 3e-1), (3, 4, 3e-1), (8, 4, 3e-1), (16, 4, 1e-6)]),
 ];
 
@@ -133,14 +133,8 @@ fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
                 assert!(error < 3.0 * tolerance, "{name}: {error:.1e}");
                 chosen += work;
             }
-            // it is more where fewer cells happen to do for what comes than one may count on, and where three points do and
-            // the unit must have four, lest it leaves a plane with too few
-            let most = match (scene, i) {
-                (Scene::Umbilical, 1) => 3.1,
-                (Scene::Pulse, 0) => 2.6,
-                (Scene::Spin, 0) => 2.2,
-                _ => 2.0,
-            };
+            // it is more where nine cells of one point do for a coil, of which the estimate does not know
+            let most = if (scene, i) == (Scene::Spring, 1) { 2.4 } else { 2.0 };
             let times = chosen / fixed;
             assert!(times < most, "{}, {tolerance:e}: {times:.2} times the cheapest", scene.name());
         }

@@ -298,6 +298,28 @@ fn runge_kutta_steps_are_known_in_between() {
 }
 
 #[test]
+fn a_step_of_order_4_tells_what_one_of_order_2_would_err_by() {
+    let scene = Scene::Pulse;
+    let mesh = Mesh::uniform(1.0, 4, 4, Vec3::zeros());
+    let state = State::at_rest_shape(&mesh, &scene.boundary(0.0).base);
+    let mut stepper = Stepper::new(mesh, Rod::circular(5e-3, 5e6, 5e6 / 3.0, 1100.0), state);
+    stepper.start(&scene.boundary(0.0)).unwrap();
+    let h = 2e-3;
+    for i in 0..150 {
+        let drive = |since: f64| scene.boundary(f64::from(i) * h + since);
+        let simple = stepper.attempt(&TR_BDF2, &drive, h, 1e-10).unwrap().error;
+        assert!((stepper.simple_error() - simple).abs() < 1e-12 * simple);
+        stepper.attempt(&ESDIRK4, &drive, h, 1e-10).unwrap();
+        // the same third derivative but for the next one times h, which counts most where the former passes zero
+        if i > 10 {
+            let times = stepper.simple_error() / simple;
+            assert!((0.8..1.25).contains(&times), "step {i}: {times:.2}");
+        }
+        stepper.accept();
+    }
+}
+
+#[test]
 fn the_parameters_of_the_papers_examples_are_first_order_and_implicit_euler() {
     let printed = Scheme { alpha: 0.3, beta: 0.0, gamma: 0.7 };
     let orders = orders_in_time(Scene::Pulse, Method::Alpha(printed), &[480, 720, 960]);

@@ -336,7 +336,8 @@ impl Parameters {
         };
         let coarsest = in_cells(cells.ceil() as usize, stages);
         let most = likely.max(turn).max(coarsest.cells.len() as f64);
-        let refiner = Refiner::new(&coarsest, tolerance, (ROOM * most).max(LEAST_ROOM) as usize);
+        let slow = self.length / self.time(rod).powi(2);
+        let refiner = Refiner::new(&coarsest, tolerance, slow, (ROOM * most).max(LEAST_ROOM) as usize);
         let cells = if self.tip_mode == 1 {
             // the motion to come is not seen at the start
             self.length / self.longest_cell(rod, boundary, tolerance)
@@ -510,7 +511,8 @@ const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
 /// As measured on a spring of four turns: at these tolerances such cells use up their share.
-const COILS: [Coil; 3] = [
+const COILS: [Coil; 4] = [
+    Coil { stages: 1, cost: 0.2, reference: 1e-2 },
     Coil { stages: 2, cost: 0.34, reference: 1.6e-3 },
     Coil { stages: 3, cost: 0.54, reference: 9e-5 },
     Coil { stages: 4, cost: 1.0, reference: 1.7e-6 },
