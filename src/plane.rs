@@ -704,13 +704,13 @@ impl Plane {
                 Origin::Same(old) => strain = self.fields[old].strain,
                 Origin::First(old) | Origin::Second(old) => {
                     let stages = self.mesh.rule.stages;
-                    let bounded = |bending: Bending| {
-                        let most = bending.most(stages);
-                        bending.missed.clamp(-most, most)
-                    };
                     let missed = match curvatures {
                         Curvatures::Kept => 0.0,
-                        Curvatures::Settled | Curvatures::Balanced => bounded(self.bending(old, series)),
+                        Curvatures::Settled | Curvatures::Balanced => {
+                            let bending = self.bending(old, series);
+                            let most = bending.most(stages);
+                            bending.missed.clamp(-most, most)
+                        }
                     };
                     for k in 0..stages {
                         let (_, theta) = origin.at(self.mesh.rule.c[k]);

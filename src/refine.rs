@@ -548,7 +548,9 @@ impl Refiner {
         for (curvatures, most) in tries {
             let fits = |after: &Energy| {
                 gain = (after.total() - energy.total()) / scale;
-                gain <= most && (curvatures != Curvatures::Settled || -gain <= most)
+                // what settles may lose no more than it may gain
+                let change = if curvatures == Curvatures::Settled { gain.abs() } else { gain };
+                change <= most
             };
             if plane.remesh(cells, (origins, series), drive, curvatures, fits).map_err(singular)? {
                 self.curvatures = curvatures;
@@ -572,6 +574,7 @@ impl Refiner {
             match report {
                 Ok(report) => {
                     iterations += report.iterations;
+                    // it is the slowest rod of all, and has no more for that
                     self.estimate_state(stepper, &stepper.state, AT_REST * QUIET);
                     self.lately.clone_from(&self.errors);
                     if unfit || !self.plan(&stepper.mesh, false) {
