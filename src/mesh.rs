@@ -220,6 +220,18 @@ impl Mesh {
         Self { cells: nodes.windows(2).map(cell).collect(), rule: Gauss::new(stages) }
     }
 
+    /// Makes the first of several equal cells no longer than `most`, m, and the others longer for it.
+    pub fn shorten_first(&mut self, most: f64) {
+        let length = self.length();
+        let [first, others @ ..] = &mut self.cells[..] else { return };
+        if others.is_empty() || first.length <= most {
+            return;
+        }
+        first.length = most;
+        let other = (length - most) / others.len() as f64;
+        others.iter_mut().for_each(|cell| cell.length = other);
+    }
+
     /// Arc length of the rod, m.
     pub fn length(&self) -> f64 {
         self.cells.iter().map(|cell| cell.length).sum()
@@ -250,6 +262,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_first_cell_is_shortened_and_the_rod_is_not() {
+        let mut mesh = Mesh::uniform(2.0, 3, 4, Vector3::zeros());
+        mesh.shorten_first(1.0);
+        assert_eq!(mesh, Mesh::uniform(2.0, 3, 4, Vector3::zeros()));
+        mesh.shorten_first(0.5);
+        assert_eq!(mesh.cells.iter().map(|cell| cell.length).collect::<Vec<_>>(), [0.5, 0.75, 0.75]);
+        let mut whole = Mesh::uniform(2.0, 1, 4, Vector3::zeros());
+        whole.shorten_first(0.5);
+        assert_eq!(whole.length(), 2.0);
     }
 
     #[test]
