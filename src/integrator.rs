@@ -50,6 +50,8 @@ const CHANGE: (f64, f64) = (0.2, 4.0);
 const SPACE_SHARE: Share = Share { part: 0.026, power: 0.17 };
 /// The same in a plane.
 const PLANE_SHARE: Share = Share { part: 0.09, power: 0.15 };
+/// The same of steps of order 5: what is estimated is of order 4, and further above what they err by.
+const FINE_SHARE: Share = Share { part: 0.18, power: 0.15 };
 /// Part of the estimated error that the iteration of a step of order 4 may leave: those of many point one way and add up.
 /// One of order 2 may leave as much as that.
 const ITERATED: f64 = 0.5;
@@ -367,12 +369,11 @@ impl Integrator {
         mesh_before.cells.reserve(most - cells.len());
         stepper.reserve(most);
         let planar = planar.then(|| {
-            let method = if tolerance < FINE { &RODAS5P } else { &RODAS4 };
+            let (method, share) = if tolerance < FINE { (&RODAS5P, FINE_SHARE) } else { (&RODAS4, PLANE_SHARE) };
             let mut plane = Plane::new(&stepper.mesh, &stepper.rod, method);
             plane.reserve(most);
             let room = || Disturbance::new(most * stages);
-            let (pace, unwatched) =
-                (pace(method.order as i32, PLANE_SHARE.of(tolerance), SHORTEST_PLANE_STEP), (0.0, 0));
+            let (pace, unwatched) = (pace(method.order as i32, share.of(tolerance), SHORTEST_PLANE_STEP), (0.0, 0));
             Box::new(Planar {
                 kept: plane.kept(),
                 before: (pace, room(), unwatched),
@@ -445,10 +446,10 @@ impl Integrator {
     /// # Errors
     /// [`Failed`]; the rod is then exactly as before that.
     pub fn go_on(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
-        let begin = drive(0.0).boundary;
+        let begin = drive(0.0);
         let done = match self.way {
-            Way::Accurate { .. } if begin.tip.held == Held::FREE => self.follow(drive, duration),
-            Way::Accurate { .. } | Way::Equal => self.catch(&begin).and_then(|()| self.march(drive, duration)),
+            Way::Accurate { .. } if begin.boundary.tip.held == Held::FREE => self.follow(drive, &begin, duration),
+            Way::Accurate { .. } | Way::Equal => self.catch(&begin.boundary).and_then(|()| self.march(drive, duration)),
             Way::Static => self.drift(drive, duration),
         };
         if done.is_err() {
@@ -576,17 +577,19 @@ impl Integrator {
         Ok(())
     }
 
-    /// An interval in steps of order 4.
-    fn follow(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) -> Result<(), Failed> {
-        self.choose(drive, duration);
+    /// An interval in steps of order 4; `begin` is what acts at its beginning.
+    fn follow(&mut self, drive: &impl Fn(f64) -> Drive, begin: &Drive, duration: f64) -> Result<(), Failed> {
+        let ahead = ahead(drive, duration);
+        let ends = [begin, &ahead[1]];
+        self.choose(begin, &ahead);
         let planar = self.in_plane;
-        let time = if planar { self.follow_in_plane(drive, duration, true) } else { 0.0 };
+        let time = if planar { self.follow_in_plane(drive, ends, duration, true) } else { 0.0 };
         let done = self.follow_in_space(drive, time, duration);
         if done.is_err() && planar {
             // better in a plane that it would leave than nowhere
             self.restore();
-            self.choose(drive, duration);
-            if self.in_plane && self.follow_in_plane(drive, duration, false) == duration {
+            self.choose(begin, &ahead);
+            if self.in_plane && self.follow_in_plane(drive, ends, duration, false) == duration {
                 return Ok(());
             }
         }
@@ -594,12 +597,9 @@ impl Integrator {
     }
 
     /// Enters or leaves a plane, as all that acts in the interval makes it.
-    fn choose(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64) {
+    fn choose(&mut self, begin: &Drive, ahead: &[Drive; 2]) {
         let Some(Planar { plane, disturbance, unwatched, .. }) = self.planar.as_deref_mut() else { return };
-        let begin = drive(0.0);
-        // velocities on a smooth path are parabolas, here at least: three of them decide
-        let ahead = [drive(0.5 * duration), drive(duration)];
-        let holds = |plane: &Plane| plane.holds(&begin) && ahead.iter().all(|drive| plane.holds(drive));
+        let holds = |plane: &Plane| plane.holds(begin) && ahead.iter().all(|drive| plane.holds(drive));
         let mut entered = false;
         if self.in_plane && !holds(plane) {
             write(plane, &mut self.stepper);
@@ -607,7 +607,7 @@ impl Integrator {
         }
         if !self.in_plane {
             plane.take_mesh(&self.stepper.mesh.cells);
-            entered = plane.enter(&self.stepper.state, &begin) && holds(plane);
+            entered = plane.enter(&self.stepper.state, begin) && holds(plane);
             self.in_plane = entered;
             if entered {
                 disturbance.begin(plane, 1.0);
@@ -617,7 +617,7 @@ impl Integrator {
         let Drive { boundary, rates } = plane.drive();
         let jumped = has_jumped(boundary, &begin.boundary)
             || differ(&rates.angular_acceleration, &begin.rates.angular_acceleration);
-        if self.in_plane && (entered || jumped) && plane.start(&begin).is_err() {
+        if self.in_plane && (entered || jumped) && plane.start(begin).is_err() {
             if !entered {
                 write(plane, &mut self.stepper);
             }
@@ -626,16 +626,22 @@ impl Integrator {
     }
 
     /// Follows in the plane as long as the steps need not be too short, and if it is `watched`, as long as the rod would stay
-    /// there; returns how far that was, s. Beyond that the rod is in space.
-    fn follow_in_plane(&mut self, drive: &impl Fn(f64) -> Drive, duration: f64, watched: bool) -> f64 {
+    /// there; returns how far that was, s. Beyond that the rod is in space. `begin` and `end` are what acts at those of the
+    /// interval.
+    fn follow_in_plane(
+        &mut self,
+        drive: &impl Fn(f64) -> Drive,
+        [begin, end]: [&Drive; 2],
+        duration: f64,
+        watched: bool,
+    ) -> f64 {
         let Some(mut planar) = self.planar.take() else { return 0.0 };
-        let begin = drive(0.0);
-        let works = planar.plane.is_lossy() || acts(&begin) || acts(&drive(duration));
-        planar.plane.look(1.0, &begin);
+        let works = planar.plane.is_lossy() || acts(begin) || acts(end);
+        planar.plane.look(1.0, begin);
         // what pulls the rod may be other than before
         self.energy = self.energy.now(&planar.plane.energy());
         if self.effort.steps > 0 {
-            self.adapt_in_plane(&mut planar, &begin);
+            self.adapt_in_plane(&mut planar, begin);
         }
         let (mut time, mut refuses, mut attempts) = (0.0, true, 0);
         while time < duration && self.in_plane {
@@ -657,7 +663,8 @@ impl Integrator {
             }
             let due = watched && planar.is_due(dt);
             if !last {
-                self.adapt_in_plane(&mut planar, &at(dt));
+                let now = *planar.plane.drive();
+                self.adapt_in_plane(&mut planar, &now);
             }
             time = if last { duration } else { time + dt };
             if due && !planar.stays() {
@@ -725,7 +732,7 @@ impl Integrator {
             return Outcome::TooLong;
         }
         if let Some((refiner, _)) = self.refiners.as_mut().filter(|_| refuses) {
-            let refused = refiner.refuse_plane(plane, &drive(0.0));
+            let refused = refiner.refuse_plane(plane, drive);
             if refused != Ok(false) {
                 disturbance.go_on(plane);
                 self.energy = self.energy.now(&plane.energy());
@@ -1183,7 +1190,7 @@ impl Course {
     pub fn stays_in_plane(&self, drive: &impl Fn(f64) -> Drive) -> bool {
         let in_plane = |event: &Event| matches!(event, Event::InPlane(_) | Event::Cells(_));
         let mut rod = self.begin.clone();
-        rod.choose(drive, self.duration);
+        rod.choose(&drive(0.0), &ahead(drive, self.duration));
         rod.in_plane && self.events.iter().all(in_plane)
     }
 
@@ -1205,7 +1212,7 @@ impl Course {
         match rod.way {
             Way::Accurate { .. } if drive(0.0).boundary.tip.held == Held::FREE => {
                 if in_plane {
-                    rod.choose(drive, self.duration);
+                    rod.choose(&drive(0.0), &ahead(drive, self.duration));
                 }
                 match in_plane && rod.in_plane {
                     true => rod.repeat_in_plane(&self.events, drive)?,
@@ -1284,11 +1291,11 @@ fn take_in_plane(plane: &mut Plane, drive: &impl Fn(f64) -> Drive, dt: f64, work
     if works {
         plane.look(0.5, &drive(0.5 * dt));
         let middle = plane.power();
-        plane.look(1.0, &drive(dt));
+        plane.look_at_present();
         // Simpson's rule
         work = begin.times(dt / 6.0).plus(middle, 4.0 * dt / 6.0).plus(plane.power(), dt / 6.0);
     } else {
-        plane.look(1.0, &drive(dt));
+        plane.look_at_present();
     }
     before.worked(&work).now(&plane.energy())
 }
@@ -1297,6 +1304,12 @@ fn take_in_plane(plane: &mut Plane, drive: &impl Fn(f64) -> Drive, dt: f64, work
 fn write(plane: &mut Plane, stepper: &mut Stepper) {
     stepper.take_mesh(&plane.mesh().cells);
     plane.write(&mut stepper.state);
+}
+
+/// What acts within an interval and at its end: velocities on a smooth path are parabolas, here at least, and three of them
+/// tell whether all of it lies in a plane.
+fn ahead(drive: &impl Fn(f64) -> Drive, duration: f64) -> [Drive; 2] {
+    [drive(0.5 * duration), drive(duration)]
 }
 
 /// Whether loads or accelerations of the base are not those that the rod's accelerations belong to.

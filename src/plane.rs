@@ -1385,6 +1385,12 @@ impl Plane {
         self.see(drive);
     }
 
+    /// The same of the present, under what acts on it.
+    pub fn look_at_present(&mut self) {
+        let drive = self.drive;
+        self.look(1.0, &drive);
+    }
+
     /// How often something else was looked at.
     pub(crate) fn looks(&self) -> u64 {
         self.looks
@@ -1593,9 +1599,8 @@ impl Plane {
 
     /// Makes `state` the present, as a start of a rod in space on the same mesh. Looks at the present.
     pub fn write(&mut self, state: &mut State) {
-        let drive = self.drive;
-        self.look(1.0, &drive);
-        let Self { frame, mesh, section, .. } = self;
+        self.look_at_present();
+        let Self { frame, mesh, section, drive, .. } = self;
         let base = drive.boundary.base.position;
         let gravity = frame.part(&drive.boundary.gravity);
         let axis = frame.axis;

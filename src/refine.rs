@@ -494,17 +494,18 @@ impl Refiner {
         Ok(true)
     }
 
-    /// The same of a step in a plane that is accepted, and of which the end is seen: it is taken back.
+    /// The same of a step in a plane that is accepted, and of which the end is seen: it is taken back. `drive` is of the time
+    /// since its beginning.
     ///
     /// # Errors
     /// [`Diverged`] as of [`Self::adapt`]; the step is taken back all the same.
-    pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &Drive) -> Result<bool, Diverged> {
+    pub fn refuse_plane(&mut self, plane: &mut Plane, drive: &impl Fn(f64) -> Drive) -> Result<bool, Diverged> {
         self.estimate_plane(plane);
         if !self.refuses(plane.mesh(), REFUSED_IN_PLANE) {
             return Ok(false);
         }
         plane.take_back();
-        self.change_plane(plane, drive, By::Energy(WILD))?;
+        self.change_plane(plane, &drive(0.0), By::Energy(WILD))?;
         Ok(true)
     }
 

@@ -27,13 +27,13 @@ type Setting = (i32, i32, f64);
 /// The cheapest settings, found by search, that meet the tolerances from 1e-2 down by tens, and not by luck: with a rod of
 /// another [stiffness](STIFFNESS) too.
 const CHEAPEST: [(Scene, &[Setting]); 7] = [
-    (Scene::Rope, &[(3, 4, 3e-1), (8, 4, 3e-1), (12, 4, 3e-1), (16, 4, 3e-5)]),
-    (Scene::Wire, &[(1, 3, 3e-1), (1, 3, 3e-1), (1, 4, 3e-1), (2, 3, 3e-1), (3, 4, 3e-6)]),
+    (Scene::Rope, &[(3, 4, 3e-1), (8, 4, 3e-1), (12, 4, 3e-1), (16, 4, 2e-5)]),
+    (Scene::Wire, &[(1, 3, 3e-1), (1, 3, 3e-1), (1, 4, 3e-1), (2, 3, 3e-1), (2, 4, 3e-6)]),
     (Scene::Pulse, &[(4, 3, 3e-1), (8, 3, 1e-3), (12, 3, 1e-4), (12, 4, 1e-5), (16, 4, 3e-6)]),
     (Scene::Spring, &[(9, 1, 3e-1), (9, 1, 3e-1), (14, 2, 1e-4), (11, 3, 3e-5)]),
     (Scene::Hair, &[(4, 4, 3e-1), (8, 4, 3e-1), (12, 4, 1e-4), (24, 4, 3e-5)]),
     (Scene::Spin, &[(2, 2, 3e-1), (2, 3, 3e-4), (4, 3, 3e-5), (6, 3, 3e-6), (10, 3, 3e-7)]),
-    (Scene::Umbilical, &[(1, 3, 3e-1), (1, 4, 3e-1), (3, 4, 3e-1), (8, 4, 3e-1), (16, 4, 1e-6)]),
+    (Scene::Umbilical, &[(1, 3, 3e-1), (1, 4, 3e-1), (3, 4, 3e-1), (8, 4, 3e-1), (16, 4, 7e-7)]),
 ];
 
 /// Over that of the scene.
@@ -114,7 +114,7 @@ fn the_tip_is_within_three_times_the_tolerance() {
 }
 
 #[test]
-fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
+fn a_tolerance_costs_at_most_twice_the_cheapest_settings() {
     for (scene, settings) in CHEAPEST {
         // a softer hair whips within the time for which it can be predicted
         let stiffness = if scene == Scene::Hair { &STIFFNESS[..1] } else { &STIFFNESS };
@@ -133,17 +133,28 @@ fn a_tolerance_costs_little_more_than_the_cheapest_settings() {
                 assert!(error < 3.0 * tolerance, "{name}: {error:.1e}");
                 chosen += work;
             }
-            // it is more where cells do for the tip that are far from enough for the moment on the base: a quarter of that is
-            // amiss on one cell of the line, and three quarters on nine of one point of the coil
-            let most = match (scene, i) {
-                (Scene::Umbilical, 1) => 2.8,
-                (Scene::Spring, 0) => 2.1,
-                (Scene::Spring, 1) => 2.4,
-                _ => 2.0,
-            };
             let times = chosen / fixed;
-            assert!(times < most, "{}, {tolerance:e}: {times:.2} times the cheapest", scene.name());
+            assert!(times < 2.0, "{}, {tolerance:e}: {times:.2} times the cheapest", scene.name());
         }
+    }
+}
+
+#[test]
+fn the_moment_on_the_base_is_not_far_off_where_the_tip_is_right() {
+    // where a pull bends the rod within much less than a cell, one cell of the line is right for the tip and off by 27 % here
+    let scene = Scene::Umbilical;
+    let moments = |parameters: &Parameters, tolerance: f64| {
+        let mut moments = Vec::new();
+        follow(scene, parameters, tolerance, |rod| moments.push(rod.ends().moment));
+        moments
+    };
+    let exact = moments(&Parameters { cells: 32, stages: 4, ..scene.parameters() }, 1e-7);
+    let largest = exact.iter().map(Vector3::norm).fold(0.0, f64::max);
+    for (tolerance, most) in [(1e-3, 0.025), (1e-4, 2.5e-3)] {
+        let found = moments(&scene.parameters(), tolerance);
+        let sum: f64 = found.iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum();
+        let error = (sum / 100.0).sqrt() / largest;
+        assert!(error < most, "{tolerance:e}: {error:.1e}");
     }
 }
 
