@@ -382,24 +382,20 @@ pub fn overview(charts: &[Chart], others: &[Point]) -> Result<Page, Box<dyn Erro
     })
 }
 
-/// What the unit makes of a tolerance: the error over it, and its CPU time over that of the cheapest cells that it may be
-/// given and that are as accurate as asked.
+/// What the unit makes of a tolerance: the error over it, and its CPU time over that of the cheapest cells and steps that it
+/// may be given and that are as accurate as asked.
 pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
     const SIZE: f64 = 12.0;
     let (width, top, height) = (1000.0, 84.0, 320.0);
     let colors = [RED, BLUE, GREEN, ORANGE, VIOLET, GREY, INK];
     let shapes = [Shape::Disc, Shape::Square, Shape::Triangle, Shape::Diamond, Shape::Cross];
-    let error: fn(&Chart, f64, &Point) -> Option<f64> = |_, tolerance, point| Some(point.tip_error? / tolerance);
-    let cost: fn(&Chart, f64, &Point) -> Option<f64> = |chart, tolerance, point| {
-        let fixed = chart.outcome.points.iter().filter(|point| point.tolerance.is_none() && !point.long_steps);
-        let enough = fixed.filter(|point| point.tip_error.is_some_and(|error| error <= tolerance));
-        Some(point.cpu / enough.map(|point| point.cpu).min_by(f64::total_cmp)?)
-    };
+    let error: fn(f64, &Point) -> Option<f64> = |tolerance, point| Some(point.tip_error? / tolerance);
+    let cost: fn(f64, &Point) -> Option<f64> = |_, point| point.over_cheapest;
     Page::draw(width as u32, (top + height + 84.0) as u32, |page| {
         text(page, "What the unit makes of a tolerance", (24.0, 22.0), 19.0, INK, HPos::Left)?;
         let panels = [
             ("error of the tip over the tolerance", error, (-4, 1), 3.0),
-            ("CPU time over that of the cheapest given cells", cost, (-1, 2), 2.0),
+            ("CPU time over that of the cheapest given cells and steps", cost, (-1, 2), 2.0),
         ];
         for (number, (title, value, range, bound)) in panels.into_iter().enumerate() {
             let axes = Axes { time: (-6, -2), error: range };
@@ -429,7 +425,7 @@ pub fn calibration(charts: &[Chart]) -> Result<Page, Box<dyn Error>> {
                     .iter()
                     .filter_map(|point| Some((point.tolerance.filter(|tolerance| *tolerance >= 3.0 * known)?, point)))
                     .filter_map(|(tolerance, point)| {
-                        let value = value(chart, tolerance, point)?.clamp(low, high);
+                        let value = value(tolerance, point)?.clamp(low, high);
                         Some((panel.x(tolerance), panel.y(value)))
                     })
                     .collect();

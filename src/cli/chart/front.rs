@@ -38,8 +38,8 @@ pub struct Point {
     pub reaction_error: Option<f64>,
     /// What the code was asked for, if that and nothing else.
     pub tolerance: Option<f64>,
-    /// Whether its steps are longer than a communication step, as no unit can take them.
-    pub long_steps: bool,
+    /// The time of that over the time of the cheapest cells and steps that the unit may be given and that are as accurate.
+    pub over_cheapest: Option<f64>,
 }
 
 /// The columns of its tables; a tolerance is in the setting.

@@ -105,6 +105,8 @@ type Solve<'a> = Box<dyn Fn(Resolution) -> Result<Run, Box<dyn Error>> + 'a>;
 pub struct Method<'a> {
     /// Its name in tables.
     pub code: &'static str,
+    /// Whether the unit takes such steps, or the library alone.
+    pub of_unit: bool,
     /// All it may be asked for; tolerances from the coarsest on.
     pub resolutions: Vec<Resolution>,
     pub solve: Solve<'a>,
@@ -119,22 +121,26 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     let dense = grids(&cells, &STAGES, LONG_STEPS.map(Steps::Equal).into_iter().chain(refinements(SAMPLES)));
     let on_cells = |code, planar| Method {
         code,
+        of_unit: true,
         resolutions: grids(&cells, &STAGES, STEP_TOLERANCES.map(Steps::To).into_iter()),
         solve: Box::new(move |resolution| of_unit_alone(scene, resolution, planar)),
     };
     let planar = |code, method| Method {
         code,
+        of_unit: false,
         resolutions: dense.clone(),
         solve: Box::new(move |resolution| of_plane_grid(scene, resolution, method)),
     };
     let mut methods = vec![
         Method {
             code: "cosserat-rod order 2",
+            of_unit: true,
             resolutions: to_samples,
             solve: Box::new(move |resolution| of_grid(scene, resolution, generalised_alpha)),
         },
         Method {
             code: "cosserat-rod order 4",
+            of_unit: false,
             resolutions: dense.clone(),
             solve: Box::new(move |resolution| of_grid(scene, resolution, fourth_order)),
         },
@@ -151,6 +157,7 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     }
     methods.push(Method {
         code: "cosserat-rod to a tolerance",
+        of_unit: true,
         resolutions: tolerances(&TOLERANCES),
         solve: Box::new(move |resolution| of_unit_alone(scene, resolution, true)),
     });
@@ -168,6 +175,7 @@ pub fn of_unit(experiment: &Experiment) -> Vec<Method<'_>> {
     let asked = |otherwise: &[f64]| if given.tolerance > 0.0 { vec![given.tolerance] } else { otherwise.to_vec() };
     let method = |code, resolutions| Method {
         code,
+        of_unit: true,
         resolutions,
         solve: Box::new(move |resolution| {
             simulate(experiment, &set(given, resolution, experiment.duration()), resolution)

@@ -200,6 +200,12 @@ fn summary(chart: &Chart) -> Result<String, std::fmt::Error> {
             }
         }
     }
+    writeln!(out, "\ntolerance        tip    time over that of the cheapest cells and steps given")?;
+    for (point, tolerance) in points.iter().filter_map(|point| Some((point, point.tolerance?))) {
+        let error = point.tip_error.map_or("-".to_owned(), |error| format!("{error:.1e}"));
+        let times = point.over_cheapest.map_or("-".to_owned(), |times| format!("{times:.2}"));
+        writeln!(out, "{tolerance:>9.0e} {error:>10}    {times}")?;
+    }
     Ok(out)
 }
 

@@ -109,9 +109,13 @@ pub struct Outcome {
 /// Below this a run is repeated, s.
 const SHORT: f64 = 0.1;
 const REPEATS: usize = 3;
-/// Of the budget, for a reference of our own, and for the tolerances.
+/// How many are timed in turn with what chose its own, and how often: few µs are soon those of a cold cache.
+const RIVALS: usize = 3;
+const ROUNDS: usize = 9;
+/// Of the budget, for a reference of our own, for the tolerances, and for the grids.
 const FOR_REFERENCE: f64 = 0.5;
 const FOR_TOLERANCES: f64 = 0.25;
+const FOR_GRIDS: f64 = 0.75;
 /// Factor of the errors above those of cheaper runs, from which on a run is not refined further; and the same where
 /// nothing is resolved yet.
 const FAR: f64 = 1.4;
@@ -186,6 +190,35 @@ impl Ledger<'_, '_> {
                 self.done.push((method, resolution, run));
             }
         }
+    }
+
+    /// CPU time of what chose its own cells and steps to a tolerance, over that of the cheapest that the unit may be given and
+    /// that are as accurate; none where the budget does not last for it. The speed of a machine changes from one second to
+    /// the next: those that seem the cheapest are run in turn with it.
+    fn over_cheapest(&mut self, chosen: usize, errors: &[Errors]) -> Option<f64> {
+        let Resolution::Tolerance(tolerance) = self.done[chosen].1 else { return None };
+        let methods = &self.problem.methods;
+        let is_given = |(method, resolution, _): &(usize, Resolution, Run)| {
+            methods[*method].of_unit && matches!(resolution, Resolution::Grid { .. })
+        };
+        let enough = |&i: &usize| is_given(&self.done[i]) && errors[i].tip <= tolerance;
+        let mut rivals: Vec<usize> = (0..self.done.len()).filter(enough).collect();
+        rivals.sort_by(|&a, &b| self.done[a].2.cpu.total_cmp(&self.done[b].2.cpu));
+        rivals.truncate(RIVALS);
+        let solve = |i: usize| (methods[self.done[i].0].solve)(self.done[i].1).ok().map(|run| run.cpu);
+        let mut most: Option<f64> = None;
+        for rival in rivals {
+            let mut ratios = Vec::new();
+            let round = self.done[chosen].2.cpu + self.done[rival].2.cpu;
+            while ratios.len() < ROUNDS && self.spent + round <= self.budget {
+                self.spent += round;
+                ratios.push(solve(chosen)? / solve(rival)?);
+            }
+            ratios.sort_by(f64::total_cmp);
+            let median = ratios.get(ratios.len() / 2).copied();
+            most = if median > most { median } else { most };
+        }
+        most
     }
 
     fn skip(&mut self, resolution: Resolution, time: f64) {
@@ -312,7 +345,7 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
     }
     for (method, Method { resolutions, .. }) in problem.methods.iter().enumerate() {
         // methods that remain share what remains
-        let most = ledger.spent + (budget - ledger.spent) / (problem.methods.len() - method) as f64;
+        let most = ledger.spent + (FOR_GRIDS * budget - ledger.spent) / (problem.methods.len() - method) as f64;
         grids(&mut ledger, method, resolutions, &reference, most);
         // steps that no unit can take, past communication points, are not all there is to know
         let others: Vec<_> = resolutions
@@ -324,8 +357,9 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
     }
 
     let mut points = Vec::new();
-    for (method, resolution, run) in &ledger.done {
-        let errors = reference.errors(run, problem);
+    let all_errors: Vec<Errors> = ledger.done.iter().map(|(.., run)| reference.errors(run, problem)).collect();
+    let over_cheapest: Vec<_> = (0..all_errors.len()).map(|i| ledger.over_cheapest(i, &all_errors)).collect();
+    for (((method, resolution, run), errors), over_cheapest) in ledger.done.iter().zip(all_errors).zip(over_cheapest) {
         // the reference itself
         if errors.tip == 0.0 {
             continue;
@@ -342,7 +376,7 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
                 Resolution::Tolerance(tolerance) => Some(*tolerance),
                 Resolution::Grid { .. } => None,
             },
-            long_steps: resolution.is_longer_than(run.tip.len() - 1),
+            over_cheapest,
         });
     }
     let mut notes = Vec::new();
@@ -377,6 +411,7 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
         let tried = ledger.find(method, resolution).map(|run| (run.cpu, reference.errors(run, ledger.problem)));
         // one that failed, but not for the budget, is refined as well
         let affordable = ledger.predicted(method, resolution) + ledger.spent <= most;
+        // in cells, in steps
         let refine = match tried {
             Some((cpu, errors)) => {
                 let dominated = |gain: f64| {
@@ -388,19 +423,19 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
                     errors.tip > gain * tip && errors.reaction.is_none_or(|error| error > gain * reaction)
                 };
                 let far = dominated(if errors.coarse() { FAR_WHERE_COARSE } else { FAR });
+                let coarse = errors.coarse();
                 closed.push((cpu, errors));
-                !far && !errors.unknown(reference)
+                let refine = !far && !errors.unknown(reference);
+                // cells with which nothing is resolved tell nothing of more of them
+                [refine || coarse, refine]
             }
-            None => affordable,
+            None => [affordable; 2],
         };
-        if !refine {
-            continue;
-        }
         let finer = [
             after(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, steps }),
             after(&steps_axis, steps).map(|steps| Resolution::Grid { cells, stages, steps }),
         ];
-        for finer in finer.into_iter().flatten() {
+        for finer in finer.into_iter().zip(refine).filter_map(|(finer, refine)| finer.filter(|_| refine)) {
             if !seen.contains(&finer) {
                 seen.push(finer);
                 open.push(finer);
