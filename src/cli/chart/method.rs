@@ -151,9 +151,9 @@ pub fn of_scene(scene: Scene) -> Vec<Method<'static>> {
     let whole = [0.0, 0.3, 0.7, 1.0].map(|part| scene.drive(part * scene.duration()));
     if Plane::of(&mesh, &scene.rod(), &start, &RODAS4).is_some_and(|plane| whole.iter().all(|drive| plane.holds(drive)))
     {
+        methods.push(on_cells("cosserat-rod plane, on given cells", true));
         methods.push(planar("cosserat-rod plane, order 4", &RODAS4));
         methods.push(planar("cosserat-rod plane, order 5", &RODAS5P));
-        methods.push(on_cells("cosserat-rod plane, on given cells", true));
     }
     methods.push(Method {
         code: "cosserat-rod to a tolerance",

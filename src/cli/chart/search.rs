@@ -193,9 +193,9 @@ impl Ledger<'_, '_> {
     }
 
     /// CPU time of what chose its own cells and steps to a tolerance, over that of the cheapest that the unit may be given and
-    /// that are as accurate; none where the budget does not last for it. The speed of a machine changes from one second to
+    /// that are as accurate; none where `most`, s, does not last for it. The speed of a machine changes from one second to
     /// the next: those that seem the cheapest are run in turn with it.
-    fn over_cheapest(&mut self, chosen: usize, errors: &[Errors]) -> Option<f64> {
+    fn over_cheapest(&mut self, chosen: usize, errors: &[Errors], most: f64) -> Option<f64> {
         let Resolution::Tolerance(tolerance) = self.done[chosen].1 else { return None };
         let methods = &self.problem.methods;
         let is_given = |(method, resolution, _): &(usize, Resolution, Run)| {
@@ -206,19 +206,19 @@ impl Ledger<'_, '_> {
         rivals.sort_by(|&a, &b| self.done[a].2.cpu.total_cmp(&self.done[b].2.cpu));
         rivals.truncate(RIVALS);
         let solve = |i: usize| (methods[self.done[i].0].solve)(self.done[i].1).ok().map(|run| run.cpu);
-        let mut most: Option<f64> = None;
+        let mut largest: Option<f64> = None;
         for rival in rivals {
             let mut ratios = Vec::new();
             let round = self.done[chosen].2.cpu + self.done[rival].2.cpu;
-            while ratios.len() < ROUNDS && self.spent + round <= self.budget {
+            while ratios.len() < ROUNDS && self.spent + round <= most {
                 self.spent += round;
                 ratios.push(solve(chosen)? / solve(rival)?);
             }
             ratios.sort_by(f64::total_cmp);
             let median = ratios.get(ratios.len() / 2).copied();
-            most = if median > most { median } else { most };
+            largest = if median > largest { median } else { largest };
         }
-        most
+        largest
     }
 
     fn skip(&mut self, resolution: Resolution, time: f64) {
@@ -358,7 +358,9 @@ pub fn search(problem: &Problem, reference: Option<Reference>, budget: f64) -> R
 
     let mut points = Vec::new();
     let all_errors: Vec<Errors> = ledger.done.iter().map(|(.., run)| reference.errors(run, problem)).collect();
-    let over_cheapest: Vec<_> = (0..all_errors.len()).map(|i| ledger.over_cheapest(i, &all_errors)).collect();
+    // grids may have taken more than was predicted
+    let most = ledger.spent + (1.0 - FOR_GRIDS) * budget;
+    let over_cheapest: Vec<_> = (0..all_errors.len()).map(|i| ledger.over_cheapest(i, &all_errors, most)).collect();
     for (((method, resolution, run), errors), over_cheapest) in ledger.done.iter().zip(all_errors).zip(over_cheapest) {
         // the reference itself
         if errors.tip == 0.0 {
