@@ -21,6 +21,12 @@ fn reference(scene: Scene) -> (Vec<Vector3<f64>>, f64) {
     (tips, content["tip_uncertainty"].as_f64().unwrap())
 }
 
+/// Root mean square of the distances.
+fn apart(found: &[Vector3<f64>], exact: &[Vector3<f64>]) -> f64 {
+    let sum: f64 = found.iter().zip(exact).map(|(a, b)| (a - b).norm_squared()).sum();
+    (sum / exact.len() as f64).sqrt()
+}
+
 /// Cells, points in each, tolerance of the steps.
 type Setting = (i32, i32, f64);
 
@@ -80,10 +86,9 @@ struct Run {
 }
 
 fn run(scene: Scene, parameters: &Parameters, tips: &[Vector3<f64>], tolerance: f64) -> Run {
-    let mut tips = tips.iter();
-    let (mut sum, mut work, mut before) = (0.0, 0.0, Effort::default());
+    let (mut found, mut work, mut before) = (Vec::new(), 0.0, Effort::default());
     let rod = follow(scene, parameters, tolerance, |rod| {
-        sum += (rod.ends().position - tips.next().unwrap()).norm_squared();
+        found.push(rod.ends().position);
         let stages = rod.in_space().mesh.rule.stages;
         let (effort, cells) = (*rod.effort(), rod.cells() as f64);
         // as timed, cells of fewer points over those of four, and what a step takes besides
@@ -94,7 +99,7 @@ fn run(scene: Scene, parameters: &Parameters, tips: &[Vector3<f64>], tolerance: 
         work += f64::from(count) * (cells * cell[stages - 1] + besides);
         before = effort;
     });
-    Run { rod, error: (sum / 100.0).sqrt() / scene.parameters().length, work }
+    Run { rod, error: apart(&found, tips) / scene.parameters().length, work }
 }
 
 #[test]
@@ -151,9 +156,7 @@ fn the_moment_on_the_base_is_not_far_off_where_the_tip_is_right() {
     let exact = moments(&Parameters { cells: 32, stages: 4, ..scene.parameters() }, 1e-7);
     let largest = exact.iter().map(Vector3::norm).fold(0.0, f64::max);
     for (tolerance, most) in [(1e-3, 0.025), (1e-4, 2.5e-3)] {
-        let found = moments(&scene.parameters(), tolerance);
-        let sum: f64 = found.iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum();
-        let error = (sum / 100.0).sqrt() / largest;
+        let error = apart(&moments(&scene.parameters(), tolerance), &exact) / largest;
         assert!(error < most, "{tolerance:e}: {error:.1e}");
     }
 }
@@ -192,9 +195,7 @@ fn the_tip_is_so_after_a_blow_to_a_rod_at_rest() {
         for planar in [true, false] {
             let exact = tips(kind, planar, 1e-6);
             for tolerance in [1e-2, 1e-3, 1e-4] {
-                let found = tips(kind, planar, tolerance);
-                let sum: f64 = found.iter().zip(&exact).map(|(a, b)| (a - b).norm_squared()).sum();
-                let error = (sum / 60.0).sqrt();
+                let error = apart(&tips(kind, planar, tolerance), &exact);
                 // a few cells wait for the blow; the step that meets it is taken back
                 assert!(error < 3.0 * tolerance, "{kind}, planar {planar}, {tolerance:e}: {error:.1e}");
             }

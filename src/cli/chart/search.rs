@@ -413,8 +413,7 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
         let tried = ledger.find(method, resolution).map(|run| (run.cpu, reference.errors(run, ledger.problem)));
         // one that failed, but not for the budget, is refined as well
         let affordable = ledger.predicted(method, resolution) + ledger.spent <= most;
-        // in cells, in steps
-        let refine = match tried {
+        let [in_cells, in_steps] = match tried {
             Some((cpu, errors)) => {
                 let dominated = |gain: f64| {
                     let cheaper = closed.iter().filter(|(other, _)| *other <= cpu);
@@ -427,17 +426,17 @@ fn grids(ledger: &mut Ledger, method: usize, resolutions: &[Resolution], referen
                 let far = dominated(if errors.coarse() { FAR_WHERE_COARSE } else { FAR });
                 let coarse = errors.coarse();
                 closed.push((cpu, errors));
-                let refine = !far && !errors.unknown(reference);
+                let worth_it = !far && !errors.unknown(reference);
                 // cells with which nothing is resolved tell nothing of more of them
-                [refine || coarse, refine]
+                [worth_it || coarse, worth_it]
             }
             None => [affordable; 2],
         };
         let finer = [
-            after(&cells_axis, cells).map(|cells| Resolution::Grid { cells, stages, steps }),
-            after(&steps_axis, steps).map(|steps| Resolution::Grid { cells, stages, steps }),
+            after(&cells_axis, cells).filter(|_| in_cells).map(|cells| Resolution::Grid { cells, stages, steps }),
+            after(&steps_axis, steps).filter(|_| in_steps).map(|steps| Resolution::Grid { cells, stages, steps }),
         ];
-        for finer in finer.into_iter().zip(refine).filter_map(|(finer, refine)| finer.filter(|_| refine)) {
+        for finer in finer.into_iter().flatten() {
             if !seen.contains(&finer) {
                 seen.push(finer);
                 open.push(finer);
